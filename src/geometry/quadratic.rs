@@ -49,6 +49,23 @@ impl Quadratic {
         [Some(first.min(second)), Some(first.max(second))]
     }
 
+    /// No value between 0 and 1 is farther from 0.
+    #[must_use]
+    pub fn size(&self) -> f64 {
+        self.a.abs() + self.b.abs() + self.c.abs()
+    }
+
+    /// Whether it is above `level` all over `[t0, t1]`; rounding aside.
+    #[must_use]
+    pub fn stays_above(&self, level: f64, (t0, t1): (f64, f64)) -> bool {
+        if self.at(t0).min(self.at(t1)) <= level {
+            return false;
+        }
+        // It dips below both ends only where its slope turns from falling to rising.
+        let dips = 2.0 * self.a * t0 + self.b < 0.0 && 2.0 * self.a * t1 + self.b > 0.0;
+        !dips || 4.0 * self.a * (self.c - level) > self.b * self.b
+    }
+
     /// Least and greatest value over `[t0, t1]`.
     #[must_use]
     pub fn extremes(&self, t0: f64, t1: f64) -> (f64, f64) {
@@ -89,6 +106,26 @@ mod tests {
         check(1.0, 0.0, 1.0, [None, None]);
         check(1.0, 0.0, 0.0, [Some(0.0), Some(0.0)]);
         check(0.0, 0.0, 1.0, [None, None]);
+    }
+
+    #[test]
+    fn a_dip_between_the_ends_is_seen() {
+        let bowl = Quadratic {
+            a: 4.0,
+            b: -4.0,
+            c: 3.0,
+        };
+        assert!((bowl.size() - 11.0).abs() < 1e-12);
+        for (level, part, stays) in [
+            (1.9, (0.0, 1.0), true),
+            (2.1, (0.0, 1.0), false),
+            (2.1, (0.7, 1.0), true),
+            (2.1, (0.0, 0.4), false),
+            (2.9, (-1.0, 0.0), true),
+            (3.1, (-1.0, 0.0), false),
+        ] {
+            assert_eq!(bowl.stays_above(level, part), stays, "{level} {part:?}");
+        }
     }
 
     #[test]

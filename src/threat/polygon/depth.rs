@@ -1,7 +1,9 @@
 //! Greatest depth of a leg inside a ring.
 
+use std::cell::Cell;
+
 use super::Polygon;
-use super::nearest::{Edge, cut};
+use super::nearest::{self, Edge, cut};
 use crate::geometry::Segment;
 
 impl Polygon {
@@ -15,15 +17,16 @@ impl Polygon {
         let length = leg.horizontal_length();
         let reach = middle + 0.5 * (to - from) * length;
         let features = self.features_near(leg, (from, to), reach);
-        let mut depth = middle;
+        let depth = Cell::new(middle);
         if !features.is_empty() {
+            let deeper = |distance: f64| nearest::reach(distance, length) > depth.get();
             // Distance is convex on each piece, so its maximum is at an end.
-            cut(&features, (from, to), length, &mut |piece| {
+            cut(&features, (from, to), length, &deeper, &mut |piece| {
                 let (d0, d1) = piece.end_distances(leg);
-                depth = depth.max(d0).max(d1);
+                depth.set(depth.get().max(d0).max(d1));
             });
         }
-        depth
+        depth.get()
     }
 
     /// As `depth`, for a convex ring: the depth is the least distance from the edges' lines. Its maximum lies where a

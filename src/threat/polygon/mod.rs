@@ -2,7 +2,9 @@
 //!
 //! Deliberately absent: which feature of the ring is nearest along a leg; see [`nearest`].
 
+mod cells;
 mod depth;
+mod exposure;
 mod index;
 mod nearest;
 mod zones;
@@ -11,6 +13,7 @@ use super::{Cylinder, hover_exposure, intensity};
 use crate::geometry::{LEVEL, Point2, Rect, Segment, ring};
 pub(crate) use zones::{HAIR, Zone};
 
+use cells::Cells;
 use index::Index;
 use nearest::{Edge, Feature, Kind, Piece, cut};
 
@@ -24,6 +27,8 @@ pub struct Polygon {
     is_convex: bool,
     /// `None` if no part of the soft zone is known to belong to a single edge or corner.
     zones: Option<Vec<Zone>>,
+    /// Which part of the soft zone belongs to which edge and corner.
+    cells: Box<Cells>,
     margin: f64,
     /// Box around the ring itself.
     bounds: Rect,
@@ -45,6 +50,7 @@ impl Polygon {
         Self {
             is_convex,
             zones: zones::zones(&vertices, is_convex, margin),
+            cells: Box::new(Cells::of(&vertices)),
             extent: bounds.grown(margin),
             index: Index::of(&vertices),
             bounds,
@@ -142,12 +148,14 @@ impl Polygon {
             let depth = -self.distance(leg.at(window.0).xy());
             return (depth.max(0.0), 0.0);
         }
-        let near = self.features_near(leg, window, self.margin);
+        let edges = self.edges_near(leg, window, self.margin);
+        let near = edges.iter().map(|&edge| &self.edges[edge]);
+        let near = nearest::features_near(near, leg, window, 0.0);
         // Inside and outside are not decided by the nearest feature: where edges are nearly in line, rounding may
         // pick the wrong one beside a vertex, and miss the crossing.
         let crossings = nearest::crossings(&near, window);
         let length = leg.horizontal_length();
-        let is_exposed = self.margin > 0.0 && length >= LEVEL && !near.is_empty();
+        let is_exposed = self.margin > 0.0 && length >= LEVEL && !edges.is_empty();
         let (mut depth, mut exposure, mut from) = (0.0_f64, 0.0, window.0);
         for to in crossings.into_iter().chain([window.1]) {
             if self.contains(leg.at(0.5 * (from + to)).xy()) {
@@ -156,7 +164,7 @@ impl Polygon {
             } else if is_exposed && to > from {
                 exposure += self
                     .exposure_outside(leg, (from, to))
-                    .unwrap_or_else(|| self.exposure_among(&near, leg, (from, to), window));
+                    .unwrap_or_else(|| self.exposure_among(leg, (from, to)));
             }
             from = to;
         }
@@ -166,38 +174,43 @@ impl Polygon {
         (depth, exposure)
     }
 
-    /// Exposure of the part `part` of `leg`, which is outside the ring, where one of `features` (those near `window`)
-    /// is the nearest.
-    fn exposure_among(
-        &self,
-        features: &[Feature],
-        leg: &Segment,
-        part: (f64, f64),
-        window: (f64, f64),
-    ) -> f64 {
-        let near;
-        let features = if self.index.is_some() && part != window {
-            near = self.features_near(leg, part, self.margin);
-            &near[..]
-        } else {
-            features
-        };
+    /// Exposure of the part `part` of `leg`, which is outside the ring.
+    fn exposure_among(&self, leg: &Segment, part: (f64, f64)) -> f64 {
+        let features = self.features_near(leg, part, self.margin);
         let mut exposure = 0.0;
         if !features.is_empty() {
-            cut(features, part, leg.horizontal_length(), &mut |piece| {
+            let length = leg.horizontal_length();
+            cut(&features, part, length, &|_| true, &mut |piece| {
                 exposure += self.piece_exposure(leg, &piece);
             });
         }
         exposure
     }
 
+    /// The edges, in order, that come within `reach` metres of the part `window` of `leg`, and possibly others.
+    fn edges_near(&self, leg: &Segment, window: (f64, f64), reach: f64) -> Vec<usize> {
+        let (from, to) = (leg.at(window.0).xy(), leg.at(window.1).xy());
+        self.edges_beside(from, to, nearest::reach(reach, (to - from).norm()))
+    }
+
+    /// The edges, in order, that come within `reach` metres of the box around two points, and possibly others.
+    fn edges_beside(&self, from: Point2, to: Point2, reach: f64) -> Vec<usize> {
+        if let Some(index) = &self.index {
+            return index.near(from, to, reach);
+        }
+        let (low, high, reach) = (from.inf(&to), from.sup(&to), reach + HAIR);
+        let off =
+            |a: f64, b: f64, low: f64, high: f64| a.max(b) < low - reach || a.min(b) > high + reach;
+        let meets = |(_, (a, b)): &(usize, (Point2, Point2))| {
+            !off(a.x, b.x, low.x, high.x) && !off(a.y, b.y, low.y, high.y)
+        };
+        let edges = ring::edges(&self.vertices).enumerate();
+        edges.filter(meets).map(|(idx, _)| idx).collect()
+    }
+
     /// The vertices and edges that come within `reach` metres of the part `window` of `leg`, and possibly others.
     fn features_near(&self, leg: &Segment, window: (f64, f64), reach: f64) -> Vec<Feature> {
-        let Some(index) = &self.index else {
-            return nearest::features_near(&self.edges, leg, window, reach);
-        };
-        let (from, to) = (leg.at(window.0).xy(), leg.at(window.1).xy());
-        let edges = index.near(from, to, nearest::reach(reach, (to - from).norm()));
+        let edges = self.edges_near(leg, window, reach);
         let edges = edges.into_iter().map(|edge| &self.edges[edge]);
         nearest::features_near(edges, leg, window, reach)
     }
@@ -255,7 +268,8 @@ impl Polygon {
     fn pieces(&self, leg: &Segment, window: (f64, f64)) -> Vec<Piece> {
         let features = self.features(leg, window);
         let mut pieces = Vec::new();
-        cut(&features, window, leg.horizontal_length(), &mut |piece| {
+        let length = leg.horizontal_length();
+        cut(&features, window, length, &|_| true, &mut |piece| {
             pieces.push(piece);
         });
         if window.0 >= window.1 {

@@ -105,7 +105,8 @@ pub(super) fn features_near<'e>(
     let length = way.norm();
     let reach = self::reach(reach, length);
     let beyond = |u: f64, v: f64, low: f64, high: f64| u.max(v) < low || u.min(v) > high;
-    let mut features = Vec::new();
+    let edges = edges.into_iter();
+    let mut features = Vec::with_capacity(2 * edges.size_hint().0);
     for edge in edges {
         let (u, v) = (from - edge.a, to - edge.a);
         let (across0, across1) = (edge.along.perp(&u), edge.along.perp(&v));
@@ -241,36 +242,43 @@ pub(super) fn mark_inside(pieces: &mut Vec<Piece>, (from, to): (f64, f64)) {
 }
 
 /// The pieces of `window` of a leg of horizontal `length`, in order: the feature nearest to its middle is nearest on
-/// a part of it; the rest is cut recursively.
+/// a part of it; the rest is cut recursively. Parts on which nothing is farther from the ring than a distance that is not
+/// `wanted` may be left out.
 pub(super) fn cut(
     features: &[Feature],
     (t0, t1): (f64, f64),
     length: f64,
+    wanted: &impl Fn(f64) -> bool,
     found: &mut impl FnMut(Piece),
 ) {
     let middle = 0.5 * (t0 + t1);
-    let nearest = nearest_at(features, middle);
-    let kept;
+    let mut first = nearest_at(features, middle);
+    let nearest = &features[first];
+    let away = nearest.squared.at(middle).max(0.0).sqrt();
+    if !wanted(away + 0.5 * (t1 - t0) * length) {
+        return;
+    }
+    let mut kept = Vec::new();
     let features = if features.len() > FEW_FEATURES {
         // At either end the nearest feature is at most half the window farther away, and any other at most half the
         // window nearer.
-        let reach = nearest.squared.at(middle).max(0.0).sqrt() + (t1 - t0) * length;
+        let reach = away + (t1 - t0) * length;
         let reach = reach * reach * (1.0 + 1e-9) + 1e-9 * (1.0 + length * length);
         let may_reign = |feature: &&Feature| {
             feature.valid.0 <= t1 && feature.valid.1 >= t0 && feature.squared.at(middle) <= reach
         };
-        kept = features
-            .iter()
-            .filter(may_reign)
-            .copied()
-            .collect::<Vec<_>>();
+        let (before, others) = features.split_at(first);
+        kept.reserve(features.len());
+        kept.extend(before.iter().filter(may_reign));
+        first = kept.len();
+        kept.extend(others.iter().filter(may_reign));
         &kept[..]
     } else {
         features
     };
-    let (from, to) = reign(features, nearest, middle, (t0, t1));
+    let (from, to) = reign(features, first, middle, (t0, t1));
     if from - t0 > SHORTEST_PIECE {
-        cut(features, (t0, from), length, found);
+        cut(features, (t0, from), length, wanted, found);
     }
     let mut push = |t0, t1| {
         found(Piece {
@@ -289,67 +297,113 @@ pub(super) fn cut(
         _ => push(from, to),
     }
     if t1 - to > SHORTEST_PIECE {
-        cut(features, (to, t1), length, found);
+        cut(features, (to, t1), length, wanted, found);
     }
 }
 
-fn nearest_at(features: &[Feature], t: f64) -> &Feature {
-    features
-        .iter()
-        .filter(|feature| feature.valid.0 <= t && t <= feature.valid.1)
-        .min_by(|f, g| f.squared.at(t).total_cmp(&g.squared.at(t)))
-        .expect("vertices are valid everywhere")
+/// The index of the nearest of `features` at `t`.
+fn nearest_at(features: &[Feature], t: f64) -> usize {
+    let mut nearest = (f64::INFINITY, None);
+    for (idx, feature) in features.iter().enumerate() {
+        let squared = feature.squared.at(t);
+        if squared < nearest.0 && feature.valid.0 <= t && t <= feature.valid.1 {
+            nearest = (squared, Some(idx));
+        }
+    }
+    nearest.1.expect("vertices are valid everywhere")
 }
 
-/// The largest part of `window` around `middle` in which `nearest` stays the nearest.
-fn reign(features: &[Feature], nearest: &Feature, middle: f64, window: (f64, f64)) -> (f64, f64) {
-    let (mut from, mut to) = (window.0.max(nearest.valid.0), window.1.min(nearest.valid.1));
-    let mut shrink_to = |t: f64| {
-        if t < middle {
-            from = from.max(t);
-        } else if t > middle {
-            to = to.min(t);
-        }
+/// The largest part of `window` around `middle` in which the feature `first` stays the nearest.
+fn reign(features: &[Feature], first: usize, middle: f64, window: (f64, f64)) -> (f64, f64) {
+    let nearest = &features[first];
+    let mut reign = Reign {
+        from: window.0.max(nearest.valid.0),
+        to: window.1.min(nearest.valid.1),
+        middle,
+        ends_here: false,
+        begins_here: false,
     };
-    let (mut ends_here, mut begins_here) = (false, false);
-    for rival in features {
-        if rival.valid.1 < window.0 || rival.valid.0 > window.1 {
-            continue;
-        }
+    // What lies beside it along the ring mostly ends its reign; others are then told at a glance.
+    let beside = first.saturating_sub(BESIDE)..features.len().min(first + BESIDE + 1);
+    for rival in features[beside].iter().chain(features) {
+        reign.meet(rival, nearest);
+    }
+    reign.bounds()
+}
+
+/// Features on either side of the nearest that are compared with it first.
+const BESIDE: usize = 2;
+
+/// A part of a leg, around its `middle`, in which one feature is the nearest.
+struct Reign {
+    from: f64,
+    to: f64,
+    middle: f64,
+    ends_here: bool,
+    begins_here: bool,
+}
+
+impl Reign {
+    /// Shrink where `rival` is nearer than `nearest`.
+    fn meet(&mut self, rival: &Feature, nearest: &Feature) {
+        let part = (
+            rival.valid.0.max(self.from - NO_TIME),
+            rival.valid.1.min(self.to + NO_TIME),
+        );
         let ahead = rival.squared.minus(&nearest.squared);
+        // What decides further down, and rounding, lies within this.
+        let size = nearest.squared.size() + rival.squared.size();
+        if part.0 > part.1 || ahead.stays_above(1e-9 * (1.0 + size), part) {
+            return;
+        }
         for root in ahead.roots().into_iter().flatten() {
             if root < rival.valid.0 || root > rival.valid.1 {
                 continue;
             }
-            if (root - middle).abs() > NO_TIME {
-                shrink_to(root);
+            if (root - self.middle).abs() > NO_TIME {
+                self.shrink_to(root);
                 continue;
             }
             // Equally near at the middle: the slope shows on which side the rival is nearer.
             let slope = 2.0 * ahead.a * root + ahead.b;
-            ends_here |= slope < 0.0 || (slope == 0.0 && ahead.a < 0.0);
-            begins_here |= slope > 0.0 || (slope == 0.0 && ahead.a < 0.0);
+            self.ends_here |= slope < 0.0 || (slope == 0.0 && ahead.a < 0.0);
+            self.begins_here |= slope > 0.0 || (slope == 0.0 && ahead.a < 0.0);
         }
         // An edge takes over from its own end exactly where it becomes valid: a double root, which rounding may hide.
         for (t, takes_over) in [(rival.valid.0, true), (rival.valid.1, false)] {
             if !t.is_finite() || ahead.at(t) > 1e-9 * (1.0 + nearest.squared.at(t)) {
                 continue;
             }
-            if (t - middle).abs() > NO_TIME {
-                shrink_to(t);
+            if (t - self.middle).abs() > NO_TIME {
+                self.shrink_to(t);
             } else {
                 // The slope of a double root is rounding.
-                ends_here |= takes_over;
-                begins_here |= !takes_over;
+                self.ends_here |= takes_over;
+                self.begins_here |= !takes_over;
             }
         }
     }
-    (
-        if begins_here {
-            middle
-        } else {
-            from.min(middle)
-        },
-        if ends_here { middle } else { to.max(middle) },
-    )
+
+    fn shrink_to(&mut self, t: f64) {
+        if t < self.middle {
+            self.from = self.from.max(t);
+        } else if t > self.middle {
+            self.to = self.to.min(t);
+        }
+    }
+
+    fn bounds(&self) -> (f64, f64) {
+        (
+            if self.begins_here {
+                self.middle
+            } else {
+                self.from.min(self.middle)
+            },
+            if self.ends_here {
+                self.middle
+            } else {
+                self.to.max(self.middle)
+            },
+        )
+    }
 }

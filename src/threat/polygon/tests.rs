@@ -155,6 +155,38 @@ fn a_triangle_is_entered_as_deep_as_it_is() {
     assert!((depth - sampled).abs() < 0.01, "{depth} {sampled}");
 }
 
+/// Both walls of a bay are equally near all along its middle: each point belongs to one of them.
+#[test]
+fn the_middle_of_a_bay_is_exposed_once() {
+    let bay = |margin| {
+        ring(
+            &[
+                [-10.0, -5.0],
+                [10.0, -5.0],
+                [10.0, 20.0],
+                [5.0, 20.0],
+                [5.0, 0.0],
+                [-5.0, 0.0],
+                [-5.0, 20.0],
+                [-10.0, 20.0],
+            ],
+            margin,
+        )
+    };
+    for (margin, to, expected) in [
+        // 2 m of T over 13 m, and up to where the end of the bay is nearer.
+        (7.0, 5.0, 2.0 * 15.0),
+        (7.0, 2.0, 2.0 * 15.0 + 3.0 * 3.5),
+        (5.0, 2.0, 3.0 * 1.5),
+    ] {
+        for off in [0.0, 1e-13, -1e-13] {
+            let down = leg([off, 20.0, 0.0], [off, to, 0.0]);
+            let exposure = bay(margin).exposure(&down, (0.0, 1.0));
+            assert!((exposure - expected).abs() < 1e-9, "{exposure} {expected}");
+        }
+    }
+}
+
 /// Across the square at mid-height: two ramps of the margin outside and 10 m inside.
 #[test]
 fn exposure_across() {
@@ -425,6 +457,32 @@ proptest! {
             prop_assert!((depth - deepest).abs() < 1e-6, "{depth} {deepest}");
             prop_assert!((exposure - sum).abs() <= 1e-8 * (1.0 + sum), "{exposure} {sum}");
         }
+    }
+
+    /// The same for rings of many corners, whose cells are cut off by each other: few and many of them within the margin.
+    #[test]
+    fn exposure_to_a_jagged_ring_is_that_of_all_pieces(
+        corners in prop::collection::vec(0.0..1.0f64, 40..200), jagged in 0.0..0.3f64, margin in 0.5..40.0f64,
+        a in prop::array::uniform3(-90.0..90.0f64), b in prop::array::uniform3(-90.0..90.0f64),
+    ) {
+        let count = corners.len() as f64;
+        let corner = |(idx, away): (usize, &f64)| {
+            let angle = std::f64::consts::TAU * idx as f64 / count;
+            let (sin, cos) = libm::sincos(angle);
+            let wave = 1.0 + 0.2 * libm::sin(3.0 * angle) + jagged * away;
+            Point2::new(50.0 * wave * cos, 50.0 * wave * sin)
+        };
+        let ring = Polygon::new(corners.iter().enumerate().map(corner).collect(), margin);
+        let leg = leg(a, b);
+        let sum: f64 = ring.pieces(&leg, (0.0, 1.0)).iter().map(|piece| {
+            if piece.inside {
+                margin * (piece.t1 - piece.t0) * leg.length()
+            } else {
+                ring.piece_exposure(&leg, piece)
+            }
+        }).sum();
+        let exposure = ring.exposure(&leg, (0.0, 1.0));
+        prop_assert!((exposure - sum).abs() <= 1e-8 * (1.0 + sum), "{exposure} {sum}");
     }
 
     #[test]

@@ -5,9 +5,7 @@
 
 use nalgebra::Vector2;
 
-use super::{Polygon, nearest};
-use crate::geometry::{LEVEL, Point2, Segment, ring};
-use crate::threat::Cylinder;
+use crate::geometry::{Point2, ring};
 
 /// Non-convex rings with more vertices than this have no zones.
 const MOST_VERTICES: usize = 256;
@@ -18,7 +16,7 @@ const MOST_VERTICES: usize = 256;
 pub(crate) const HAIR: f64 = 1e-6;
 
 /// Sine of the angle between edges that are in line.
-const IN_LINE: f64 = 1e-13;
+pub(super) const IN_LINE: f64 = 1e-13;
 
 /// A part of an edge, usually all of it, and the part of the soft zone to which it is nearest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -211,85 +209,4 @@ fn is_behind(edge: &Side, other: &Side) -> bool {
     [other.a, other.b]
         .iter()
         .all(|end| edge.outward.dot(&(end - edge.a)) <= 1e-9)
-}
-
-impl Polygon {
-    /// Exposure of the part `(from, to)` of `leg`, which is not vertical and lies outside the ring, as a sum over
-    /// edges and corners; `None` if it may reach a shared zone.
-    pub(super) fn exposure_outside(&self, leg: &Segment, (from, to): (f64, f64)) -> Option<f64> {
-        let ends = [leg.at(from).xy(), leg.at(to).xy()];
-        let way = ends[1] - ends[0];
-        let reach = nearest::reach(self.margin, way.norm());
-        let beyond = |[u, v]: [f64; 2], low: f64, high: f64| u.max(v) < low || u.min(v) > high;
-        let mut exposure = 0.0;
-        for zone in self.zones.as_ref()? {
-            let seen = ends.map(|end| end - zone.a);
-            let along = seen.map(|end| end.dot(&zone.along));
-            let outward = seen.map(|end| end.dot(&zone.outward));
-            if beyond(along, -reach, zone.length + reach) || beyond(outward, -reach, reach) {
-                continue;
-            }
-            if zone.is_shared {
-                return None;
-            }
-            // Fractions of the part, from 0 to 1.
-            let beside = clip(along, [0.0, zone.length], [HAIR, zone.overhang]);
-            exposure += self.beside_edge(outward, beside) * (to - from) * leg.length();
-            if let Some(before) = zone.before {
-                let past = clip(
-                    seen.map(|end| end.dot(&before)),
-                    [0.0, f64::INFINITY],
-                    [-HAIR; 2],
-                );
-                let ahead = clip(along, [f64::NEG_INFINITY, 0.0], [-HAIR; 2]);
-                let (enters, leaves) = (past[0].max(ahead[0]), past[1].min(ahead[1]));
-                if enters < leaves {
-                    let corner = Cylinder {
-                        center: zone.a,
-                        radius: 0.0,
-                        influence: self.margin,
-                    };
-                    let at = |share: f64| from + (to - from) * share;
-                    exposure += corner.exposure(leg, (at(enters), at(leaves)));
-                }
-            }
-        }
-        Some(exposure)
-    }
-
-    /// Integral of `T` between two fractions of a line along which the distance from an edge changes linearly. A leg in
-    /// line with the next side goes on behind the edge's line, along that side, which pays for it there.
-    fn beside_edge(&self, outward: [f64; 2], beside: [f64; 2]) -> f64 {
-        let [start, end] = outward;
-        let away = |[enters, leaves]: [f64; 2]| {
-            [enters, leaves].map(|share| start + (end - start) * share)
-        };
-        let [d0, d1] = away(beside);
-        let [enters, leaves] = if d0.min(d1) < -HAIR {
-            let before = clip(outward, [0.0, f64::INFINITY], [0.0; 2]);
-            [beside[0].max(before[0]), beside[1].min(before[1])]
-        } else {
-            beside
-        };
-        if enters >= leaves {
-            return 0.0;
-        }
-        let [d0, d1] = away([enters, leaves]);
-        self.mean_intensity(d0, d1) * (leaves - enters)
-    }
-}
-
-/// The fractions, 0 to 1, between which a value going linearly from `start` to `end` lies within `[low, high]`, widened
-/// by `hairs` for a value that stays the same; an empty range if the first is not less than the second.
-fn clip([start, end]: [f64; 2], [low, high]: [f64; 2], hairs: [f64; 2]) -> [f64; 2] {
-    let gain = end - start;
-    if gain.abs() < LEVEL {
-        return if start >= low - hairs[0] && start <= high + hairs[1] {
-            [0.0, 1.0]
-        } else {
-            [1.0, 0.0]
-        };
-    }
-    let (one, other) = ((low - start) / gain, (high - start) / gain);
-    [one.min(other).max(0.0), one.max(other).min(1.0)]
 }

@@ -110,7 +110,7 @@ impl Strip {
         let farthest = (point - a).norm_squared().max((point - b).norm_squared());
         [
             height(ring::squared_distance((a, b), point), most),
-            height(farthest, least),
+            surely(farthest, least),
         ]
     }
 
@@ -129,13 +129,17 @@ impl Strip {
             .chain(ends.iter().map(|end| ring::squared_distance(other, *end)))
             .fold(f64::INFINITY, f64::min);
         // From either end of the rival to the other as from one end of the strip to the other: the height in question
-        // is a convex quadratic over a linear function, which is greatest at an end.
+        // is a convex quadratic over a linear function, which is greatest at an end, and nothing at one that they share.
         let everywhere = [[0, 1], [1, 0]].map(|order: [usize; 2]| {
-            let at = |end: usize| {
-                let away = (others[order[end]] - ends[end]).norm_squared();
-                height(away, leans[order[end]][0])
-            };
-            at(0).max(at(1))
+            let at = [0, 1].map(|end| (others[order[end]] - ends[end]).norm_squared());
+            let heights = [0, 1].map(|end| {
+                if at[end] <= SAME && at[1 - end] > SAME {
+                    0.0
+                } else {
+                    surely(at[end], leans[order[end]][0])
+                }
+            });
+            heights[0].max(heights[1])
         });
         [height(nearest, most), everywhere[0].min(everywhere[1])]
     }
@@ -146,6 +150,15 @@ fn height(squared: f64, lean: f64) -> f64 {
     if squared <= SAME {
         0.0
     } else if lean > 0.0 {
+        squared / (2.0 * lean)
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// As `height`, above rounding: infinite where the lean may be none.
+fn surely(squared: f64, lean: f64) -> f64 {
+    if lean > 1e-12 * squared.sqrt() {
         squared / (2.0 * lean)
     } else {
         f64::INFINITY
@@ -218,6 +231,10 @@ impl Polygon {
                 (0..count).map(|strip| self.strip([edge.a; 2], [at(strip), at(strip + 1)]));
             self.find(Feature::Vertex(idx), idx, strips.collect())
         }))
+    }
+
+    pub(super) fn edge_after(&self, idx: usize) -> &Edge {
+        &self.edges[(idx + 1) % self.edges.len()]
     }
 
     pub(super) fn edge_before(&self, idx: usize) -> &Edge {

@@ -19,7 +19,8 @@ impl Polygon {
         let features = self.features_near(leg, (from, to), reach);
         let depth = Cell::new(middle);
         if !features.is_empty() {
-            let deeper = |distance: f64| nearest::reach(distance, length) > depth.get();
+            // Near the ring, distances along a long leg are less exact than elsewhere.
+            let deeper = |distance: f64| nearest::reach(distance, 10.0 * length) > depth.get();
             // Distance is convex on each piece, so its maximum is at an end.
             cut(&features, (from, to), length, &deeper, &mut |piece| {
                 let (d0, d1) = piece.end_distances(leg);

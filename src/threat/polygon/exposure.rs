@@ -3,9 +3,9 @@
 use nalgebra::Vector2;
 
 use super::Polygon;
-use super::cells::{Cell, Feature};
+use super::cells::Feature;
 use super::nearest::{self, Edge};
-use super::zones::{HAIR, IN_LINE};
+use super::zones::HAIR;
 use crate::geometry::{LEVEL, Point2, Quadratic, Segment};
 use crate::threat::Cylinder;
 
@@ -47,10 +47,19 @@ impl Part {
         }
     }
 
-    /// Where it is beside `edge`.
-    fn beside(&self, edge: &Edge) -> [f64; 2] {
-        let along = self.ends.map(|end| (end - edge.a).dot(&edge.along));
-        clip(along, [0.0, edge.length], [HAIR; 2])
+    /// Where it is beside `edge`. A leg at right angles to both of them where they meet is beside the `next` one.
+    fn beside(&self, edge: &Edge, next: &Edge) -> [f64; 2] {
+        let along = |edge: &Edge| self.ends.map(|end| (end - edge.a).dot(&edge.along));
+        let [own, on] = [along(edge), along(next)];
+        let is_level = |[start, end]: [f64; 2]| (end - start).abs() < LEVEL;
+        let meets_both = is_level(own)
+            && is_level(on)
+            && own[0] > edge.length - HAIR
+            && (-HAIR..=next.length + HAIR).contains(&on[0]);
+        if meets_both {
+            return NOWHERE;
+        }
+        clip(own, [0.0, edge.length], [HAIR; 2])
     }
 
     fn squared(&self, feature: Feature, polygon: &Polygon) -> Quadratic {
@@ -122,7 +131,7 @@ impl Polygon {
             if beyond(along, -reach, edge.length + reach) || beyond(away, -reach, reach) {
                 continue;
             }
-            beside += self.exposure_beside(idx, &part, along, away).ok()?;
+            beside += self.exposure_beside(idx, &part, away).ok()?;
             let corner = Cylinder {
                 center: edge.a,
                 radius: 0.0,
@@ -137,16 +146,9 @@ impl Polygon {
 
     /// Mean of `T` in the cell beside edge `idx`, times the share of the part that lies in it. A leg in line with the
     /// next side goes on behind the edge's line, along that side, which pays for it there.
-    fn exposure_beside(
-        &self,
-        idx: usize,
-        part: &Part,
-        along: [f64; 2],
-        away: [f64; 2],
-    ) -> Result<f64, Crowded> {
+    fn exposure_beside(&self, idx: usize, part: &Part, away: [f64; 2]) -> Result<f64, Crowded> {
         let edge = &self.edges[idx];
-        let next = &self.edges[(idx + 1) % self.edges.len()];
-        let mut window = clip(along, [0.0, edge.length], [HAIR, overhang(edge, next)]);
+        let mut window = part.beside(edge, self.edge_after(idx));
         let height = |share: f64| away[0] + (away[1] - away[0]) * share;
         if height(window[0]).min(height(window[1])) < -HAIR {
             let above = clip(away, [0.0, f64::INFINITY], [0.0; 2]);
@@ -157,7 +159,7 @@ impl Polygon {
             let found = |enters, leaves| {
                 exposure += self.mean_intensity(height(enters), height(leaves)) * (leaves - enters);
             };
-            self.reign(Feature::Edge(idx), self.beside(idx), part, window, found)?;
+            self.reign(Feature::Edge(idx), part, window, found)?;
         }
         Ok(exposure)
     }
@@ -177,27 +179,33 @@ impl Polygon {
         let past = clip(past, [0.0, f64::INFINITY], [-HAIR; 2]);
         let ahead = clip(along, [f64::NEG_INFINITY, 0.0], [-HAIR; 2]);
         let window = [past[0].max(ahead[0]), past[1].min(ahead[1])];
-        if window[0] < window[1]
-            && let Some(cell) = self.before(idx)
-        {
-            self.reign(Feature::Vertex(idx), cell, part, window, found)?;
+        if window[0] < window[1] {
+            self.reign(Feature::Vertex(idx), part, window, found)?;
         }
         Ok(())
     }
 
-    /// Call `found` with the places within `window` of a part between which `feature`, whose cell is given, is nearest.
+    /// Call `found` with the places within `window` of a part between which `feature` is the nearest.
     fn reign(
         &self,
         feature: Feature,
-        cell: &Cell,
         part: &Part,
         [from, to]: [f64; 2],
         found: impl FnMut(f64, f64),
     ) -> Result<(), Crowded> {
         let own = part.squared(feature, self);
-        if own.stays_above(cell.top * cell.top, (from, to)) {
+        let is_above = |top: f64| own.stays_above(top * top, (from, to));
+        // Many cells are never needed.
+        if is_above(self.margin) {
             return Ok(());
         }
+        let cell = match feature {
+            Feature::Edge(idx) => Some(self.beside(idx)),
+            Feature::Vertex(idx) => self.before(idx),
+        };
+        let Some(cell) = cell.filter(|cell| !is_above(cell.top)) else {
+            return Ok(());
+        };
         let mut reign = Reign {
             from,
             to,
@@ -211,7 +219,7 @@ impl Polygon {
             }
             let within = match rival.feature {
                 Feature::Vertex(_) => [from, to],
-                Feature::Edge(idx) => part.beside(&self.edges[idx]),
+                Feature::Edge(idx) => part.beside(&self.edges[idx], self.edge_after(idx)),
             };
             let ahead = part.squared(rival.feature, self).minus(&own);
             reign.lose(&ahead, within, rival.feature < feature);
@@ -221,15 +229,8 @@ impl Polygon {
     }
 }
 
-/// How far beyond an edge's end a leg at right angles to it may be, metres, to count as beside it; below 0 where the
-/// next edge goes on in line, which has that leg for its own.
-fn overhang(edge: &Edge, next: &Edge) -> f64 {
-    if edge.along.perp(&next.along).abs() < IN_LINE {
-        -HAIR
-    } else {
-        HAIR
-    }
-}
+/// An empty range.
+const NOWHERE: [f64; 2] = [1.0, 0.0];
 
 /// The fractions, 0 to 1, between which a value going linearly from `start` to `end` lies within `[low, high]`, widened
 /// by `hairs` for a value that stays the same; an empty range if the first is not less than the second.
@@ -239,7 +240,7 @@ fn clip([start, end]: [f64; 2], [low, high]: [f64; 2], hairs: [f64; 2]) -> [f64;
         return if start >= low - hairs[0] && start <= high + hairs[1] {
             [0.0, 1.0]
         } else {
-            [1.0, 0.0]
+            NOWHERE
         };
     }
     let (one, other) = ((low - start) / gain, (high - start) / gain);

@@ -82,6 +82,65 @@ fn a_leg_at_right_angles_to_a_straight_vertex_is_exposed_once() {
     }
 }
 
+/// The same where rounding makes a dent or a bump of the vertex, in a ring that points inwards elsewhere; and where a leg
+/// leaves a corner that is doubled within rounding.
+#[test]
+fn vertices_that_are_nearly_straight_or_doubled_are_exposed_once() {
+    for dent in [
+        0.0, 1e-15, -1e-15, 1e-13, -1e-13, 1e-11, -1e-11, 1e-9, -1e-9,
+    ] {
+        let notched = ring(
+            &[
+                [-10.0, 0.0],
+                [0.0, dent],
+                [10.0, 0.0],
+                [10.0, 10.0],
+                [0.0, 5.0],
+                [-10.0, 10.0],
+            ],
+            60.0,
+        );
+        let down = leg([0.0, -1.0, 0.0], [0.0, -50.0, 0.0]);
+        let exposure = notched.exposure(&down, (0.0, 1.0));
+        assert!((exposure - 1690.5).abs() < 1e-6, "{exposure} {dent}");
+    }
+    let subdivided = ring(
+        &[
+            [0.0, 0.0],
+            [0.1, 0.300_000_000_000_000_04],
+            [0.300_000_000_000_000_04, 0.9],
+            [-2.7, 1.9],
+            [-0.500_000_000_000_000_1, 0.5],
+            [-3.0, 1.0],
+        ],
+        20.0,
+    );
+    let away = leg([1.6, -0.2, 0.0], [9.1, -2.7, 0.0]);
+    let exposure = subdivided.exposure(&away, (0.0, 1.0));
+    let sum: f64 = subdivided
+        .pieces(&away, (0.0, 1.0))
+        .iter()
+        .map(|piece| subdivided.piece_exposure(&away, piece))
+        .sum();
+    assert!((exposure - sum).abs() < 1e-8, "{exposure} {sum}");
+    for gap in [1e-13, 5e-13, 5e-12, 5e-11, 5e-10, 5e-9, 1e-7] {
+        let doubled = ring(
+            &[
+                [0.0, 0.0],
+                [10.0, 0.0],
+                [10.0, gap],
+                [10.0, 10.0],
+                [5.0, 4.0],
+                [0.0, 10.0],
+            ],
+            20.0,
+        );
+        let away = leg([11.0, -1.0, 0.0], [20.0, -10.0, 0.0]);
+        let exposure = doubled.exposure(&away, (0.0, 1.0));
+        assert!((exposure - 155.558).abs() < 1e-3, "{exposure} {gap}");
+    }
+}
+
 /// The leg is halved where the nearest feature changes, and each half of the first half again.
 #[test]
 fn features_may_change_exactly_in_the_middle() {

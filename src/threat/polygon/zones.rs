@@ -16,7 +16,7 @@ const MOST_VERTICES: usize = 256;
 pub(crate) const HAIR: f64 = 1e-6;
 
 /// Sine of the angle between edges that are in line.
-pub(super) const IN_LINE: f64 = 1e-13;
+const IN_LINE: f64 = 1e-13;
 
 /// A part of an edge, usually all of it, and the part of the soft zone to which it is nearest.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -184,6 +184,11 @@ impl Cells {
     }
 }
 
+/// A height that surely is no less.
+fn above(height: f64) -> f64 {
+    height * (1.0 + SLACK) + HAIR
+}
+
 /// Whether `other` is the feature itself, or one that is as far only on the border of its cell.
 fn touches(feature: Feature, other: Feature, count: usize) -> bool {
     match (feature, other) {
@@ -265,6 +270,20 @@ impl Polygon {
             .filter(move |(other, _)| !touches(feature, *other, count))
     }
 
+    /// What may be nearer than `feature` in a strip of its cell, among `edges` and their first vertices.
+    fn rivals(&self, feature: Feature, strip: &mut Strip, edges: &[usize]) -> Vec<Rival> {
+        let mut rivals = Vec::new();
+        for near in edges {
+            for (feature, [from, everywhere]) in self.reaches(*near, feature, strip) {
+                strip.top = strip.top.min(everywhere);
+                let from = from * (1.0 - SLACK) - HAIR;
+                rivals.push(Rival { from, feature });
+            }
+        }
+        rivals.retain(|rival| rival.from <= above(strip.top));
+        rivals
+    }
+
     /// The cell of `feature`, which begins at vertex `idx`, from its strips.
     fn find(&self, feature: Feature, idx: usize, mut strips: Vec<Strip>) -> Cell {
         if self.is_convex {
@@ -283,27 +302,15 @@ impl Polygon {
             }
         }
         let top = |strips: &[Strip]| strips.iter().map(|strip| strip.top).fold(0.0, f64::max);
-        let reach = 2.0 * top(&strips) * (1.0 + SLACK) + HAIR;
+        let reach = 2.0 * above(top(&strips));
         let [from, to] = [strips[0].ends[0], strips[strips.len() - 1].ends[1]];
         let edges = self.edges_beside(from, to, reach);
         let mut rivals = None;
         if edges.len() <= MOST_EDGES {
-            let mut met: Vec<Rival> = Vec::new();
-            for strip in &mut strips {
-                let first = met.len();
-                for near in &edges {
-                    for (feature, [from, everywhere]) in self.reaches(*near, feature, strip) {
-                        strip.top = strip.top.min(everywhere);
-                        let from = from * (1.0 - SLACK) - HAIR;
-                        if from <= strip.top {
-                            met.push(Rival { from, feature });
-                        }
-                    }
-                }
-                let limit = strip.top * (1.0 + SLACK) + HAIR;
-                let strips = met.split_off(first);
-                met.extend(strips.into_iter().filter(|rival| rival.from <= limit));
-            }
+            let met = strips
+                .iter_mut()
+                .map(|strip| self.rivals(feature, strip, &edges));
+            let mut met: Vec<Rival> = met.flatten().collect();
             met.sort_by(|one, other| {
                 let order = one.feature.cmp(&other.feature);
                 order.then(one.from.total_cmp(&other.from))
@@ -312,7 +319,7 @@ impl Polygon {
             rivals = (met.len() <= MOST_RIVALS).then(|| met.into_boxed_slice());
         }
         Cell {
-            top: top(&strips) * (1.0 + SLACK) + HAIR,
+            top: above(top(&strips)),
             rivals,
         }
     }

@@ -7,7 +7,6 @@ use super::cells::Feature;
 use super::nearest::{self, Edge};
 use super::zones::HAIR;
 use crate::geometry::{LEVEL, Point2, Quadratic, Segment};
-use crate::threat::Cylinder;
 
 /// A part of a leg, seen from above. Places on it are shares of it, from 0 to 1.
 struct Part {
@@ -108,13 +107,16 @@ impl Reign {
     }
 }
 
-/// A leg passes a cell into which too much reaches.
-struct Crowded;
-
 impl Polygon {
-    /// Exposure of the part `(from, to)` of `leg`, which is not vertical and lies outside the ring; `None` where too much
-    /// reaches into a cell that it passes.
-    pub(super) fn exposure_outside(&self, leg: &Segment, (from, to): (f64, f64)) -> Option<f64> {
+    /// Exposure of the part `(from, to)` of `leg`, which is not vertical and lies outside the ring; `edges` are those
+    /// within the margin of it, and possibly others. `None`, here and below, where too much reaches into a cell that it
+    /// passes.
+    pub(super) fn exposure_outside(
+        &self,
+        edges: &[usize],
+        leg: &Segment,
+        (from, to): (f64, f64),
+    ) -> Option<f64> {
         let ends = [leg.at(from).xy(), leg.at(to).xy()];
         let part = Part {
             way: ends[1] - ends[0],
@@ -123,7 +125,7 @@ impl Polygon {
         let reach = nearest::reach(self.margin, part.way.norm());
         let beyond = |[u, v]: [f64; 2], low: f64, high: f64| u.max(v) < low || u.min(v) > high;
         let (mut beside, mut before) = (0.0, 0.0);
-        for idx in self.edges_near(leg, (from, to), self.margin) {
+        for &idx in edges {
             let edge = &self.edges[idx];
             let seen = ends.map(|end| end - edge.a);
             let along = seen.map(|end| end.dot(&edge.along));
@@ -131,22 +133,18 @@ impl Polygon {
             if beyond(along, -reach, edge.length + reach) || beyond(away, -reach, reach) {
                 continue;
             }
-            beside += self.exposure_beside(idx, &part, away).ok()?;
-            let corner = Cylinder {
-                center: edge.a,
-                radius: 0.0,
-                influence: self.margin,
-            };
+            beside += self.exposure_beside(idx, &part, away)?;
+            let corner = self.corner(edge.a);
             let at = |share: f64| from + (to - from) * share;
             let found = |enters, leaves| before += corner.exposure(leg, (at(enters), at(leaves)));
-            self.before_corner(idx, &part, along, found).ok()?;
+            self.before_corner(idx, &part, along, found)?;
         }
         Some(beside * (to - from) * leg.length() + before)
     }
 
     /// Mean of `T` in the cell beside edge `idx`, times the share of the part that lies in it. A leg in line with the
     /// next side goes on behind the edge's line, along that side, which pays for it there.
-    fn exposure_beside(&self, idx: usize, part: &Part, away: [f64; 2]) -> Result<f64, Crowded> {
+    fn exposure_beside(&self, idx: usize, part: &Part, away: [f64; 2]) -> Option<f64> {
         let edge = &self.edges[idx];
         let mut window = part.beside(edge, self.edge_after(idx));
         let height = |share: f64| away[0] + (away[1] - away[0]) * share;
@@ -161,7 +159,7 @@ impl Polygon {
             };
             self.reign(Feature::Edge(idx), part, window, found)?;
         }
-        Ok(exposure)
+        Some(exposure)
     }
 
     /// Call `found` with the places of a part between which the corner at the beginning of edge `idx` is the nearest.
@@ -171,7 +169,7 @@ impl Polygon {
         part: &Part,
         along: [f64; 2],
         found: impl FnMut(f64, f64),
-    ) -> Result<(), Crowded> {
+    ) -> Option<()> {
         let before = self.edge_before(idx);
         let past = part
             .ends
@@ -182,7 +180,7 @@ impl Polygon {
         if window[0] < window[1] {
             self.reign(Feature::Vertex(idx), part, window, found)?;
         }
-        Ok(())
+        Some(())
     }
 
     /// Call `found` with the places within `window` of a part between which `feature` is the nearest.
@@ -192,19 +190,19 @@ impl Polygon {
         part: &Part,
         [from, to]: [f64; 2],
         found: impl FnMut(f64, f64),
-    ) -> Result<(), Crowded> {
+    ) -> Option<()> {
         let own = part.squared(feature, self);
         let is_above = |top: f64| own.stays_above(top * top, (from, to));
         // Many cells are never needed.
         if is_above(self.margin) {
-            return Ok(());
+            return Some(());
         }
         let cell = match feature {
             Feature::Edge(idx) => Some(self.beside(idx)),
             Feature::Vertex(idx) => self.before(idx),
         };
         let Some(cell) = cell.filter(|cell| !is_above(cell.top)) else {
-            return Ok(());
+            return Some(());
         };
         let mut reign = Reign {
             from,
@@ -213,7 +211,7 @@ impl Polygon {
         };
         // Distances are convex: the greatest is at an end.
         let most = own.at(from).max(own.at(to));
-        for rival in cell.rivals.as_ref().ok_or(Crowded)? {
+        for rival in cell.rivals.as_ref()? {
             if rival.from > 0.0 && rival.from * rival.from > most {
                 continue;
             }
@@ -225,7 +223,7 @@ impl Polygon {
             reign.lose(&ahead, within, rival.feature < feature);
         }
         reign.parts(found);
-        Ok(())
+        Some(())
     }
 }
 

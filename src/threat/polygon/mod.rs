@@ -162,8 +162,15 @@ impl Polygon {
                 depth = depth.max(self.depth(leg, (from, to)));
                 exposure += self.margin * (to - from) * leg.length();
             } else if is_exposed && to > from {
+                let near;
+                let edges = if (from, to) == window {
+                    &edges
+                } else {
+                    near = self.edges_near(leg, (from, to), self.margin);
+                    &near
+                };
                 exposure += self
-                    .exposure_outside(leg, (from, to))
+                    .exposure_outside(edges, leg, (from, to))
                     .unwrap_or_else(|| self.exposure_among(leg, (from, to)));
             }
             from = to;
@@ -229,16 +236,20 @@ impl Polygon {
     /// Exposure of a piece outside the ring.
     fn piece_exposure(&self, leg: &Segment, piece: &Piece) -> f64 {
         if let Kind::Vertex(center) = piece.nearest.kind {
-            let corner = Cylinder {
-                center,
-                radius: 0.0,
-                influence: self.margin,
-            };
-            return corner.exposure(leg, (piece.t0, piece.t1));
+            return self.corner(center).exposure(leg, (piece.t0, piece.t1));
         }
         // The distance from an edge's line is linear.
         let (d0, d1) = piece.end_distances(leg);
         self.mean_intensity(d0, d1) * (piece.t1 - piece.t0) * leg.length()
+    }
+
+    /// What stands for a vertex: a disc of radius 0.
+    fn corner(&self, center: Point2) -> Cylinder {
+        Cylinder {
+            center,
+            radius: 0.0,
+            influence: self.margin,
+        }
     }
 
     /// Mean of `T` along a line on which the distance changes linearly from `d0` to `d1`: a trapezium, cut off at the

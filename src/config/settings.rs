@@ -195,7 +195,7 @@ fn http() -> Vec<Setting> {
         row(
             "http.answers_bytes",
             "BYTES",
-            "Memory for long answers that have not been sent yet; more are refused with 503 busy",
+            "Memory for long answers that have not been sent yet, and for stored documents that wait until one is made of them; more are refused with 503 busy",
             1 << 20..,
             |c| &mut c.http.answers_bytes,
         ),

@@ -1,4 +1,4 @@
-//! How much memory long answers take that have not been sent yet.
+//! How much memory long answers take that have not been sent yet, and long documents of which answers are made.
 //!
 //! A caller needs one connection to ask for hundreds of long results and to take none. Long answers share a room; when
 //! there is none left, those whose callers do not take them make place, and otherwise the new one is refused.
@@ -25,6 +25,15 @@ pub(super) const PIECE: usize = 16 * 1024;
 /// A caller must take so many bytes a second on average to keep an answer that others need the room of.
 const SLOWEST: f64 = 8.0 * 1024.0;
 
+/// About what a compressor occupies, bytes: its windows and tables.
+const COMPRESSOR: u64 = 320 * 1024;
+
+/// An answer of more bytes than this takes the threads that answer some milliseconds to compress.
+const LONG: u64 = 64 * 1024;
+
+/// So many of these are compressed at once, else nothing else would be answered.
+const COMPRESSORS: usize = 4;
+
 /// Among an answer's extensions, marks one that occupies nothing of its own: it is a part of the program.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Constant;
@@ -37,6 +46,8 @@ pub struct Answers(Arc<Room>);
 struct Room {
     free: Arc<Semaphore>,
     bytes: usize,
+    /// How many long answers are compressed at once.
+    compressors: Arc<Semaphore>,
     /// For so long a caller may take nothing.
     patience: Duration,
     waiting: Mutex<Waiting>,
@@ -57,6 +68,7 @@ impl Answers {
         Self(Arc::new(Room {
             free: Arc::new(Semaphore::new(bytes)),
             bytes,
+            compressors: Arc::new(Semaphore::new(COMPRESSORS)),
             patience,
             waiting: Mutex::default(),
         }))
@@ -65,16 +77,44 @@ impl Answers {
     /// Room for one answer that occupies so many bytes.
     pub(super) fn room(&self, bytes: u64) -> Result<Place, Problem> {
         let busy = Problem::Busy(Busy::Answers(self.0.bytes));
-        let share = self.0.take(bytes).ok_or(busy)?;
+        let share = Share {
+            bytes: self.0.take(bytes).ok_or(busy)?,
+            compressor: None,
+        };
         let room = self.0.clone();
         Ok(Place { share, room })
+    }
+
+    /// Room for one answer of so many bytes that is compressed as it is sent; `None` where it has to be sent plain.
+    pub(super) fn room_to_compress(&self, bytes: u64) -> Option<Place> {
+        let compressors = self.0.compressors.clone();
+        let compressor = (bytes > LONG).then(|| compressors.try_acquire_owned());
+        let compressor = compressor.transpose().ok()?;
+        let mut place = self.room(bytes + COMPRESSOR).ok()?;
+        place.share.compressor = compressor;
+        Some(place)
+    }
+
+    /// Room for so many bytes out of the store that wait until an answer can be made of them; `None` if these are few,
+    /// which need none.
+    pub(super) fn room_to_make_one(&self, bytes: usize) -> Result<Option<Place>, Problem> {
+        let is_long = bytes > PIECE;
+        is_long.then(|| self.room(bytes as u64)).transpose()
     }
 }
 
 /// Room that has been taken for one answer.
 pub(super) struct Place {
-    share: OwnedSemaphorePermit,
+    share: Share,
     room: Arc<Room>,
+}
+
+/// What one answer has of the room.
+#[derive(Debug)]
+#[expect(dead_code, reason = "held")]
+struct Share {
+    bytes: OwnedSemaphorePermit,
+    compressor: Option<OwnedSemaphorePermit>,
 }
 
 impl Place {
@@ -129,7 +169,7 @@ struct Rest {
     /// What the body has given, as far as it has not been handed over.
     piece: Bytes,
     /// `None` once the answer has been let go of.
-    share: Option<OwnedSemaphorePermit>,
+    share: Option<Share>,
     /// When somebody would have begun who had taken as much at the slowest pace.
     begun: Instant,
 }

@@ -8,9 +8,6 @@ use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove
 
 use super::answers::{Answers, Constant, PIECE};
 
-/// About what a compressor occupies, bytes: its windows and tables.
-const COMPRESSOR: u64 = 320 * 1024;
-
 /// Streams are not compressed: each event must be sent at once.
 pub(super) fn worth_compressing() -> impl Predicate {
     let plain = NotForContentType::const_new;
@@ -45,8 +42,8 @@ pub(super) fn note_plain(mut answer: Response) -> Response {
 
 /// The answer as it is sent: out of the room for answers if it occupies much of it, a refusal if there is none left.
 ///
-/// Only compressed ones keep a compressor, else every open stream would hold one; where there is no room for that, the
-/// answer is plain. `CompressionLayer` answers 406 after the work is done if no coding is acceptable; we send the plain
+/// Only compressed ones keep a compressor, else every open stream would hold one; where there is no room for that, or
+/// enough other long answers are being compressed, the answer is plain. `CompressionLayer` answers 406 after the work is done if no coding is acceptable; we send the plain
 /// answer instead.
 pub(super) fn send(
     mut answer: http::Response<CompressionBody<Body>>,
@@ -59,7 +56,7 @@ pub(super) fn send(
     }
     let length = plain.and_then(|plain| plain.length).unwrap_or(0);
     if coded && plain.is_none_or(|plain| !plain.coded) {
-        if let Ok(place) = answers.room(length + COMPRESSOR) {
+        if let Some(place) = answers.room_to_compress(length) {
             return answer.map(|body| place.hold(body));
         }
         answer.headers_mut().remove(header::CONTENT_ENCODING);
@@ -119,5 +116,27 @@ mod tests {
         let read = compressed.into_body().collect().await.expect("a body");
         assert!(read.to_bytes().len() < 10_000);
         assert!(is_coded(&sent(&answers, 200_000).await));
+    }
+
+    #[tokio::test]
+    async fn few_long_answers_are_compressed_at_once() {
+        const LONG: usize = 100_000;
+        let answers = Answers::new(1 << 24, Duration::from_secs(60));
+        let mut compressed = Vec::new();
+        let plain = loop {
+            let answer = sent(&answers, LONG).await;
+            if !is_coded(&answer) {
+                break answer;
+            }
+            compressed.push(answer);
+            assert!(compressed.len() < 100);
+        };
+        let body = plain.into_body().collect().await.expect("a body");
+        assert_eq!(body.to_bytes(), "a".repeat(LONG));
+        assert!(is_coded(&sent(&answers, 2000).await));
+
+        let read = compressed.pop().expect("some").into_body().collect().await;
+        assert!(read.expect("a body").to_bytes().len() < 10_000);
+        assert!(is_coded(&sent(&answers, LONG).await));
     }
 }

@@ -78,9 +78,12 @@ async fn written(
     let (format, document) = if choices[0].0.is_stored() {
         (choices[0].0, result)
     } else {
+        let result_room = state.answers.room_to_make_one(result.len())?;
         let scenario = state.store.scenario(plan.id).await?;
+        let scenario_room = state.answers.room_to_make_one(scenario.len())?;
         let rules = state.rules.clone();
         let write = move |scenario: &String| {
+            let _rooms = (&result_room, &scenario_room);
             let input = ResultInput {
                 result: &result,
                 scenario,

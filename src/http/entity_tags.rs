@@ -8,18 +8,17 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 
 use super::header_list;
 
-/// The entity tags of a header.
-pub(super) struct EntityTags(Vec<String>);
+/// The entity tags of a header, as it was sent: requests that wait keep them.
+pub(super) struct EntityTags(Vec<HeaderValue>);
+
+/// Tags after these are not looked at, as if they were not there.
+const MOST: usize = 100;
 
 impl EntityTags {
-    /// The tags in the header `name`; `None` without such a header. An unreadable one counts as a tag that nothing has.
+    /// The tags in the header `name`; `None` without such a header. An unreadable one has tags that nothing has.
     pub(super) fn of(headers: &HeaderMap, name: HeaderName) -> Option<Self> {
-        let mut tags = Vec::new();
-        for value in headers.get_all(name) {
-            let value = String::from_utf8_lossy(value.as_bytes());
-            tags.extend(header_list::split(&value, ',').map(str::to_owned));
-        }
-        (!tags.is_empty()).then_some(Self(tags))
+        let values: Vec<_> = headers.get_all(name).into_iter().cloned().collect();
+        (!values.is_empty()).then_some(Self(values))
     }
 
     /// Tags of the versions that the caller already has.
@@ -29,7 +28,10 @@ impl EntityTags {
 
     /// The tags as they were sent.
     pub(super) fn iter(&self) -> impl Iterator<Item = &str> {
-        self.0.iter().map(String::as_str)
+        let values = self.0.iter().map(HeaderValue::as_bytes);
+        let values = values.filter_map(|value| str::from_utf8(value).ok());
+        let tags = values.flat_map(|value| header_list::split(value, ','));
+        tags.take(MOST)
     }
 
     /// Weak comparison, RFC 9110 section 8.8.3.2.
@@ -51,5 +53,38 @@ impl<S: Sync> OptionalFromRequestParts<S> for EntityTags {
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Option<Self>, Infallible> {
         Ok(Self::known(&parts.headers))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known(values: &[&[u8]]) -> Option<EntityTags> {
+        let mut headers = HeaderMap::new();
+        for value in values {
+            let value = HeaderValue::from_bytes(value).expect("a value");
+            headers.append(header::IF_NONE_MATCH, value);
+        }
+        EntityTags::known(&headers)
+    }
+
+    #[test]
+    fn the_tags_of_all_lines_are_listed_but_for_unreadable_ones() {
+        assert!(known(&[]).is_none());
+        let tags = known(&[br#""a", W/"b""#, b"\"\xff\"", "\"\u{e9}\"".as_bytes()]);
+        let tags = tags.expect("four tags");
+        let listed: Vec<&str> = tags.iter().collect();
+        assert_eq!(listed, [r#""a""#, r#"W/"b""#, "\"\u{e9}\""]);
+        assert!(tags.contain(&HeaderValue::from_static("\"b\"")));
+        assert!(!tags.contain(&HeaderValue::from_static("\"c\"")));
+    }
+
+    #[test]
+    fn a_list_without_end_is_not_read_to_its_end() {
+        let tag = HeaderValue::from_static("\"a\"");
+        let after = |count: usize| [&b",".repeat(count), &b"\"a\""[..]].concat();
+        assert!(known(&[&after(MOST - 1)]).is_some_and(|tags| tags.contain(&tag)));
+        assert!(known(&[&after(MOST)]).is_some_and(|tags| !tags.contain(&tag)));
     }
 }

@@ -18,6 +18,9 @@ use crate::store::{LastEvent, Store, StoreError};
 /// Events read at once.
 const PAGE: usize = 128;
 
+/// About so many bytes of them are given out at once, or one event: whoever takes nothing holds this much memory.
+const PAGE_BYTES: usize = 64 * 1024;
+
 /// Maximum number of pages read when the service stops: enough for what the last runs report in their last moments,
 /// including their end, and no more, so that nobody holds up the exit.
 const LAST_PAGES: usize = 16;
@@ -123,9 +126,11 @@ impl Feed {
             let mut events = page.events;
             let quiet = events.is_empty();
             self.caught_up = quiet;
-            if self.after == 0 {
+            let is_last_page = events.len() < PAGE;
+            if self.after == 0 && is_last_page {
                 self.show_place_in_queue(&mut events).await;
             }
+            shorten(&mut events);
             self.take(events, &mut out);
             if stopping && !self.over {
                 if quiet || self.last_pages == 0 {
@@ -183,9 +188,8 @@ impl Feed {
     /// If the plan still waits, its newest event says where it was in the queue when it got there. A new reader is shown
     /// the record as it is now in its place; those who read it earlier have it under the same id.
     async fn show_place_in_queue(&self, events: &mut [NumberedEvent]) {
-        let is_last_page = events.len() < PAGE;
-        let newest = events.last_mut().filter(|_| is_last_page);
-        let Some(Event::Status(shown)) = newest.map(|newest| &mut newest.event) else {
+        let newest = events.last_mut().map(|newest| &mut newest.event);
+        let Some(Event::Status(shown)) = newest else {
             return;
         };
         if shown.status != Status::Queued {
@@ -255,6 +259,27 @@ impl Feed {
             () = tokio::time::sleep_until(deadline) => woken,
             () = stopping(&mut self.phase) => Woken::Stopping,
         }
+    }
+}
+
+/// Leaves the first events of a page, as many as may be given out at once; the store is asked for the others again.
+fn shorten(page: &mut Vec<NumberedEvent>) {
+    let mut bytes = 0;
+    let within = page.iter().take_while(|numbered| {
+        bytes += size(&numbered.event);
+        bytes <= PAGE_BYTES
+    });
+    let count = within.count();
+    page.truncate(count.max(1));
+}
+
+/// About how many bytes an event takes on the wire.
+fn size(event: &Event) -> usize {
+    const FIGURES: usize = 200;
+    const WAYPOINT: usize = 70;
+    match event {
+        Event::Incumbent(incumbent) => FIGURES + WAYPOINT * incumbent.waypoints.len(),
+        Event::Status(_) | Event::Convergence(_) | Event::End(_) => FIGURES,
     }
 }
 

@@ -23,16 +23,22 @@ pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<Strin
     let Some(best) = state.store.incumbent(plan.id).await? else {
         return Ok(None);
     };
+    let points = CURVE.min(usize::try_from(plan.iterations).unwrap_or(CURVE));
+    let curve_room = points * size_of::<Convergence>();
+    let curve_room = state.answers.room_to_make_one(curve_room)?;
     let curve = curve(state, plan).await?;
     let scenario = state.store.scenario(plan.id).await?;
+    let scenario_room = state.answers.room_to_make_one(scenario.len())?;
     let run_ms = plan
         .started_ms
         .map_or(0, |began| state.clock.now_ms() - began);
-    let origin = plan.origin(&scenario, run_ms.max(0) as f64);
-    let (rules, bounds, id) = (state.rules.clone(), state.bounds.clone(), plan.id);
-    let lower = move |scenario: &Scenario| bounds.of(id, || seeding::lower_bound(scenario));
-    let measure =
-        move |scenario: &String| measure(scenario, &rules, best, lower, curve, origin).map(Some);
+    let (rules, bounds, plan) = (state.rules.clone(), state.bounds.clone(), plan.clone());
+    let measure = move |scenario: &String| {
+        let _rooms = (&curve_room, &scenario_room);
+        let lower = |scenario: &Scenario| bounds.of(plan.id, || seeding::lower_bound(scenario));
+        let origin = plan.origin(scenario, run_ms.max(0) as f64);
+        measure(scenario, &rules, best, lower, curve, origin).map(Some)
+    };
     state.terrains.over(scenario, measure).await?
 }
 

@@ -92,9 +92,13 @@ pub(super) async fn resolve(
         }
         Err(problem) => return Err(problem),
     };
+    let room = state.answers.room_to_make_one(result.len())?;
     let frame = scenario.frame.clone();
     // A result may be long, and another datum needs the geoid, which takes its time.
-    let read = move || serde_json::from_str(&result).map(|route: Route| route.within(&frame));
+    let read = move || {
+        let _room = room;
+        serde_json::from_str(&result).map(|route: Route| route.within(&frame))
+    };
     let points = off_thread::run(read).await?.map_err(|error| {
         tracing::error!(warm_start_plan_id = %plan, %error, "a stored result cannot be read");
         Problem::Internal

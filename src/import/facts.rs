@@ -132,6 +132,11 @@ fn short(value: Value) -> Value {
     }
 }
 
+/// A value as JSON, truncated if long: it may be as long as the file.
+pub(super) fn shown(value: &Value) -> String {
+    begin(&value.to_string())
+}
+
 /// As much of a text as a scenario accepts of a name.
 pub(super) fn begin(text: &str) -> String {
     text.chars().take(LONGEST).collect()

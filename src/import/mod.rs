@@ -138,8 +138,36 @@ pub fn convert(text: &[u8], syntax: Syntax, most: Most) -> Result<Conversion, Im
     }
 }
 
+/// Most memory, about, that the values of a file may take: many times its length, where they are small.
+const MOST_BYTES: usize = 128 << 20;
+
+/// About how much memory the values of a JSON text take; each list or object, and each further member, costs the same
+/// whatever it holds.
+fn size_in_memory(text: &[u8]) -> usize {
+    const OBJECT: usize = 450;
+    const VALUE: usize = 50;
+    let (mut quoted, mut escaped, mut bytes) = (false, false, text.len());
+    for byte in text {
+        match byte {
+            _ if escaped => escaped = false,
+            b'\\' => escaped = quoted,
+            b'"' => quoted = !quoted,
+            _ if quoted => {}
+            b'{' => bytes += OBJECT,
+            b'[' | b',' => bytes += VALUE,
+            _ => {}
+        }
+    }
+    bytes
+}
+
 /// Nesting is limited by the library to 127 levels.
 fn json(text: &[u8]) -> Result<Value, ImportError> {
+    if size_in_memory(text) > MOST_BYTES {
+        return Err(ImportError::no_scenario(
+            "it has so many values that they would take more than 128 MiB of memory: leave out what no scenario needs",
+        ));
+    }
     serde_json::from_slice(text).map_err(|error| ImportError::NotJson {
         line: error.line().max(1),
         column: error.column().max(1),

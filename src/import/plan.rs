@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use serde_json::{Map, Value};
 
 use super::draft::{Draft, Place};
-use super::facts::Facts;
+use super::facts::{Facts, begin, shown};
 use super::{Conversion, ImportError, Most, antimeridian};
 
 /// MAVLink commands (`MAV_CMD`) that have a position: waypoints and similar, then take-offs and landings.
@@ -36,16 +36,37 @@ struct Home<'d> {
 const STAY_WITHIN: &str = "a fence to stay within, where a scenario has a box, its area";
 
 /// An item that has a position.
-#[derive(Debug, Clone)]
-struct Stop {
-    at: String,
+#[derive(Debug, Clone, Copy)]
+struct Stop<'d> {
+    index: usize,
+    item: &'d Value,
     place: Place,
-    /// Above mean sea level, metres; else why it is not known, which matters at the ends alone.
-    alt: Result<f64, String>,
-    /// On the ground, at the start or the end of the mission.
+    /// At the start or the end of the mission.
     on_ground: bool,
+}
+
+impl Stop<'_> {
+    fn at(&self) -> String {
+        place_of_item(self.index)
+    }
+
     /// Its altitude counts from home's.
-    from_home: bool,
+    fn is_from_home(&self) -> bool {
+        self.on_ground || is_above_home(self.item)
+    }
+
+    /// Metres above mean sea level, or why they are not known, which matters at the ends alone.
+    fn altitude(&self, home: Option<Home>) -> Result<f64, String> {
+        if self.on_ground {
+            home_altitude(home)
+        } else {
+            altitude(self.item, home)
+        }
+    }
+}
+
+fn place_of_item(index: usize) -> String {
+    format!("/mission/items/{index}")
 }
 
 /// Convert a plan to a scenario.
@@ -85,8 +106,10 @@ fn home_altitude(home: Option<Home>) -> Result<f64, String> {
     let Some(Home { alt, .. }) = home else {
         return Ok(0.0);
     };
-    alt.as_f64()
-        .ok_or_else(|| format!("counts from home, whose altitude is {alt}, must be a number"))
+    alt.as_f64().ok_or_else(|| {
+        let alt = shown(alt);
+        format!("counts from home, whose altitude is {alt}, must be a number")
+    })
 }
 
 fn speed(mission: &Value) -> Option<f64> {
@@ -100,18 +123,18 @@ fn speed(mission: &Value) -> Option<f64> {
     mission[name].as_f64().filter(|speed| *speed > 0.0)
 }
 
-fn stops(draft: &mut Draft, items: &[Value], home: Option<Home>) -> Vec<Stop> {
+fn stops<'d>(draft: &mut Draft, items: &'d [Value], home: Option<Home>) -> Vec<Stop<'d>> {
     let mut stops = Vec::new();
     for (index, item) in items.iter().enumerate() {
-        let at = format!("/mission/items/{index}");
+        let at = place_of_item(index);
         if item["type"] != "SimpleItem" {
-            let kind = item["complexItemType"].as_str().unwrap_or("unknown");
+            let kind = begin(item["complexItemType"].as_str().unwrap_or("unknown"));
             draft.leave(at, format!("a complex item ({kind}), which is not read"));
             continue;
         }
         let used = match item["command"].as_u64().unwrap_or_default() {
             command if moves(command) => {
-                stop(&at, item, command, home).map(|stop| stops.push(stop))
+                stop(index, item, command, home).map(|stop| stops.push(stop))
             }
             CHANGE_SPEED => changed_speed(item).map(|speed| draft.cruise_speed = Some(speed)),
             command => Err(format!("command {command}, which no scenario has")),
@@ -133,14 +156,20 @@ fn changed_speed(item: &Value) -> Result<f64, String> {
     let [kind, speed] = [0, 1].map(|index| &item["params"][index]);
     if !kind.as_f64().is_some_and(|kind| ALONG.contains(&kind)) {
         return Err(format!(
-            "a speed of type {kind}, must be 0 (air) or 1 (ground)"
+            "a speed of type {}, must be 0 (air) or 1 (ground)",
+            shown(kind)
         ));
     }
     let along = speed.as_f64().filter(|speed| *speed > 0.0);
-    along.ok_or_else(|| format!("speed is {speed}, must be > 0"))
+    along.ok_or_else(|| format!("speed is {}, must be > 0", shown(speed)))
 }
 
-fn stop(at: &str, item: &Value, command: u64, home: Option<Home>) -> Result<Stop, String> {
+fn stop<'d>(
+    index: usize,
+    item: &'d Value,
+    command: u64,
+    home: Option<Home>,
+) -> Result<Stop<'d>, String> {
     let param = |index: usize| item["params"][index].as_f64();
     let on_ground = TAKEOFFS.contains(&command) || LANDINGS.contains(&command);
     let somewhere = param(4).zip(param(5)).filter(|place| *place != (0.0, 0.0));
@@ -150,17 +179,11 @@ fn stop(at: &str, item: &Value, command: u64, home: Option<Home>) -> Result<Stop
         (None, Some(Home { place, .. })) if on_ground => place,
         (None, _) => return Err("an item without a place".to_owned()),
     };
-    let alt = if on_ground {
-        home_altitude(home)
-    } else {
-        altitude(item, home)
-    };
     Ok(Stop {
-        at: at.to_owned(),
+        index,
+        item,
         place,
-        alt,
         on_ground,
-        from_home: on_ground || is_above_home(item),
     })
 }
 
@@ -173,13 +196,17 @@ fn is_above_home(item: &Value) -> bool {
 fn altitude(item: &Value, home: Option<Home>) -> Result<f64, String> {
     let height = &item["params"][6];
     let number = height.as_f64();
-    let number = || number.ok_or_else(|| format!("has the altitude {height}, must be a number"));
+    let number = || {
+        let height = shown(height);
+        number.ok_or_else(|| format!("has the altitude {height}, must be a number"))
+    };
     match item["frame"].as_u64() {
         Some(0 | 5) => number(),
         _ if is_above_home(item) => Ok(home_altitude(home)? + number()?),
         Some(frame @ (10 | 11)) => {
             let above_sea = &item["AMSLAltAboveTerrain"];
             above_sea.as_f64().ok_or_else(|| {
+                let (height, above_sea) = (shown(height), shown(above_sea));
                 format!(
                     "is {height} m above terrain (frame {frame}), and AMSLAltAboveTerrain is {above_sea}, must be its altitude above sea"
                 )
@@ -187,7 +214,7 @@ fn altitude(item: &Value, home: Option<Home>) -> Result<f64, String> {
         }
         _ => Err(format!(
             "has frame {}, must be 0, 3, 5, 6, 10 or 11",
-            item["frame"]
+            shown(&item["frame"])
         )),
     }
 }
@@ -199,17 +226,17 @@ fn altitude(item: &Value, home: Option<Home>) -> Result<f64, String> {
 /// taken for the end.
 fn ends(draft: &mut Draft, home: Option<Home>, stops: &[Stop]) -> Result<(), String> {
     let set = |draft: &mut Draft, end: &str, stop: &Stop| -> Result<(), String> {
-        let Stop { at, place, .. } = stop;
-        let alt = stop.alt.clone();
+        let at = stop.at();
+        let alt = stop.altitude(home);
         let alt = alt.map_err(|reason| format!("the {end}, {at}, {reason}"))?;
         let pointer = format!("/{end}/alt");
-        if stop.from_home && home.is_none() {
+        if stop.is_from_home() && home.is_none() {
             let why = "the file has no home, which is taken to be at 0 m";
             draft.assume(&pointer, format!("{alt}: {why}"));
         } else if stop.on_ground {
             draft.assume(&pointer, format!("{alt}, on the ground as home is"));
         }
-        draft.end(end, at, *place, alt);
+        draft.end(end, &at, stop.place, alt);
         Ok(())
     };
     match (stops, home) {
@@ -217,6 +244,7 @@ fn ends(draft: &mut Draft, home: Option<Home>, stops: &[Stop]) -> Result<(), Str
         ([only], Some(Home { place, alt })) => {
             let at = "/mission/plannedHomePosition";
             let alt = alt.as_f64().ok_or_else(|| {
+                let alt = shown(alt);
                 format!("the start, {at}, has the altitude {alt}, must be a number")
             })?;
             draft.end("start", at, place, alt);
@@ -227,7 +255,7 @@ fn ends(draft: &mut Draft, home: Option<Home>, stops: &[Stop]) -> Result<(), Str
             set(draft, "start", first)?;
             set(draft, "target", last)?;
             for stop in between {
-                draft.leave(&stop.at, "a stop on the way: a plan finds its own");
+                draft.leave(stop.at(), "a stop on the way: a plan finds its own");
             }
         }
     }

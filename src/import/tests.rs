@@ -179,3 +179,17 @@ fn files_of_too_many_threats_are_refused() {
         );
     }
 }
+
+/// Small values take many times their length.
+#[test]
+fn a_file_of_more_values_than_memory_is_meant_for_is_refused() {
+    let refused = |feature: &str, count: usize| {
+        let features = vec![feature; count].join(",");
+        let text = format!(r#"{{"type":"FeatureCollection","features":[{features}]}}"#);
+        let refused = convert(text.as_bytes(), Syntax::Json).expect_err("no start");
+        refused.to_string().contains("128 MiB")
+    };
+    assert!(refused(r#"{"":0}"#, 300_000));
+    assert!(!refused(r#"{"":0}"#, 200_000));
+    assert!(!refused(r#""a,,\",,,,,,,,,,,,,,,,,,""#, 200_000));
+}

@@ -59,7 +59,7 @@ async fn a_newer_schema_is_refused_and_left_unchanged() {
     drop(database);
     let message = refusal(directory.path());
     assert!(
-        message.contains("schema version 99") && message.contains("up to 9"),
+        message.contains("schema version 99") && message.contains("up to 10"),
         "{message}"
     );
     let database = rusqlite::Connection::open(&file).unwrap();
@@ -67,6 +67,36 @@ async fn a_newer_schema_is_refused_and_left_unchanged() {
         .query_row("PRAGMA user_version", [], |row| row.get(0))
         .unwrap();
     assert_eq!(version, 99);
+}
+
+/// A caller's failed plans are found without a look at all its others.
+#[tokio::test]
+async fn an_index_serves_each_kind_of_list() {
+    let directory = TempDir::new().unwrap();
+    SqliteStore::open(directory.path(), options()).unwrap();
+    let database = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
+    for (filter, index) in [
+        ("status = 'failed'", "plans_by_status"),
+        ("owner = 'a'", "plans_by_owner"),
+        (
+            "status = 'failed' AND owner = 'a'",
+            "plans_by_owner_and_status",
+        ),
+        (
+            "status = 'failed' AND owner = 'a' AND id < 'b'",
+            "plans_by_owner_and_status",
+        ),
+    ] {
+        let sql = format!(
+            "EXPLAIN QUERY PLAN SELECT * FROM plans WHERE {filter} ORDER BY id DESC LIMIT 9"
+        );
+        let mut statement = database.prepare(&sql).unwrap();
+        let steps = statement.query_map([], |row| row.get(3)).unwrap();
+        let steps: Vec<String> = steps.map(Result::unwrap).collect();
+        assert_eq!(steps.len(), 1, "nothing is sorted: {steps:?}");
+        let served = format!("SEARCH plans USING INDEX {index} (");
+        assert!(steps[0].starts_with(&served), "{filter}: {steps:?}");
+    }
 }
 
 #[test]

@@ -105,7 +105,7 @@ impl Problem {
                     Busy::Cores => "other requests keep every core busy".to_owned(),
                     Busy::Datasets => "as many requests as may be wait for datasets".to_owned(),
                     Busy::Bodies(most) => format!("the bodies of other requests take what they may, {most} bytes"),
-                    Busy::Answers(most) => format!("answers that have not been read yet take what they may, {most} bytes"),
+                    Busy::Answers(most) => format!("answers that are being made or have not been read yet take what they may, {most} bytes"),
                 };
                 format!("{what}; try again in {A_PLACE_S} s")
             }

@@ -207,7 +207,7 @@ pub(super) enum Busy {
     Datasets,
     /// Bodies that are being received or read; all may take this many bytes.
     Bodies(usize),
-    /// Answers that have not been sent yet; all may take this many bytes.
+    /// Answers that are being made or have not been sent yet; all may take this many bytes.
     Answers(usize),
 }
 

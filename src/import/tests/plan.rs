@@ -276,3 +276,18 @@ fn speeds_of_a_plan() {
         Err("a speed of type null, must be 0 (air) or 1 (ground)"),
     );
 }
+
+/// It may be any value, and all items may count from it.
+#[test]
+fn a_long_value_in_place_of_an_altitude_is_told_once_and_shortened() {
+    let item =
+        json!({"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, 0, 1, 1, 1]});
+    let plan = json!({
+        "fileType": "Plan",
+        "mission": {"plannedHomePosition": [1, 1, "x".repeat(1_000_000)], "items": vec![item; 2_000]},
+    });
+    let refused = convert(plan.to_string().as_bytes(), Syntax::Json).expect_err("no start");
+    let text = refused.to_string();
+    let begin = "the start, /mission/items/0, counts from home, whose altitude is \"xxx";
+    assert!(text.starts_with(begin) && text.len() < 400, "{text}");
+}

@@ -128,6 +128,9 @@ ALTER TABLE health ADD COLUMN ballast BLOB; -- as large as a plan once the disk 
 ALTER TABLE tombstones ADD COLUMN status TEXT;        -- how the plan ended; NULL where an earlier version removed it
 ALTER TABLE tombstones ADD COLUMN last_event INTEGER; -- id of its end
 ",
+    "
+CREATE INDEX plans_by_owner_and_status ON plans (owner, status, id) WHERE owner IS NOT NULL;
+",
 ];
 
 /// Bring the file up to this version; refuse files of a newer one.

@@ -8,6 +8,7 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 
 use bytes::Bytes;
+use futures_util::future::join_all;
 use http_body_util::{BodyExt as _, Empty};
 use hyper::Request;
 use hyper::client::conn::http2;
@@ -194,4 +195,40 @@ async fn unread_answers_take_little_memory_and_make_room_for_those_that_are_read
     let let_go = unread.swap_remove(0).collect().await;
     let_go.expect_err("it was let go of");
     drop(followed);
+}
+
+/// Exports wait for a core, and each needs the scenario as well as the result.
+#[tokio::test(flavor = "multi_thread")]
+async fn documents_that_wait_to_be_exported_take_little_memory() {
+    const ASKED: usize = 400;
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let room = (8 << 20).to_string();
+    let service = Service::start(directory.path(), &["--http-answers-bytes", &room]);
+    let mut document = over_a_grid(600);
+    document["planner"]["iterations"] = 1.into();
+    let plan = service.submit(&document).await;
+    service.ended(&plan).await;
+    let export = format!("{plan}/result?format=csv");
+    let whole = service.bytes(&export).await;
+
+    let before = service.peak_rss_kib();
+    let exports = (0..ASKED).map(async |_| {
+        let answer = service.get(&export).send().await.expect("an answer");
+        let status = answer.status();
+        (status, answer.bytes().await.expect("a whole body"))
+    });
+    let answers = in_time(join_all(exports)).await;
+    let grown = service.peak_rss_kib() - before;
+    assert!(grown < 200 * 1024, "{grown} KiB more");
+    let (written, refused): (Vec<_>, Vec<_>) = answers
+        .into_iter()
+        .partition(|(status, _)| *status == StatusCode::OK);
+    assert!(!written.is_empty() && !refused.is_empty());
+    assert!(written.iter().all(|(_, body)| *body == whole));
+    for (status, body) in refused {
+        assert_eq!(status, StatusCode::SERVICE_UNAVAILABLE);
+        let problem: Value = serde_json::from_slice(&body).expect("JSON");
+        assert_eq!(problem["type"], "/problems/busy");
+    }
+    assert_eq!(service.bytes(&export).await, whole);
 }

@@ -14,7 +14,7 @@ use tokio::net::TcpStream;
 use super::Dice;
 use super::still::Http2;
 use crate::support::api::Api;
-use crate::support::lives::a_run_of;
+use crate::support::lives::{a_plan, a_run_of};
 use crate::support::patience::{eventually, in_time};
 use crate::support::process::Service;
 use crate::support::run;
@@ -283,4 +283,38 @@ async fn a_reader_stalled_for_a_whole_run_delays_no_other_and_loses_nothing() {
     let text = rest(&mut stalled).await;
     assert_eq!(text.matches("\nevent: ").count(), others[0].len());
     assert_eq!(text.matches("\nevent: end\n").count(), 1);
+}
+
+/// Routes of 200 waypoints: an incumbent takes 14 KB.
+#[tokio::test(flavor = "multi_thread")]
+async fn stalled_readers_of_long_routes_hold_little_memory() {
+    const STALLED: usize = 100;
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &["--workers", "1"]);
+    let mut document = a_plan(10, 400, 7);
+    document["planner"]["waypoints"] = 200.into();
+    document["planner"]["seeding"] = "random".into();
+    document["planner"]["polish"] = false.into();
+    let plan = service.submit(&document).await;
+    service.ended(&plan).await;
+    let read = Stream::open(service.get(&format!("{plan}/events?rate=0"))).await;
+    let told = events(&read.rest().await);
+    let ids: Vec<u64> = told.iter().map(|(id, _)| *id).collect();
+    assert_eq!(ids, (1..=ids.len() as u64).collect::<Vec<_>>());
+    let incumbents = told.iter().filter(|(_, name)| name == "incumbent");
+    assert!(incumbents.count() > 100);
+
+    let before = service.peak_rss_kib();
+    let mut stalled = Vec::new();
+    for _ in 0..STALLED {
+        let reader = stall(service.address(), &plan).await;
+        // Once something has come, the first page has been read.
+        let peeked = in_time(reader.peek(&mut [0; 1])).await;
+        assert_eq!(peeked.expect("an open stream"), 1);
+        stalled.push(reader);
+    }
+    let grown = service.peak_rss_kib() - before;
+    assert!(grown < STALLED as u64 * 200, "{grown} KiB more");
+    let text = rest(&mut stalled[0]).await;
+    assert_eq!(text.matches("\nevent: ").count(), told.len());
 }

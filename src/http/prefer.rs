@@ -23,11 +23,7 @@ pub(super) struct Wait(u8);
 impl Wait {
     /// The first `wait` of the headers; one that cannot be read counts as none, RFC 7240 section 2.
     pub(super) fn of(headers: &HeaderMap) -> Option<Self> {
-        headers
-            .get_all(PREFER)
-            .iter()
-            .filter_map(|value| value.to_str().ok())
-            .flat_map(|value| header_list::split(value, ','))
+        header_list::entries(headers.get_all(PREFER))
             .filter_map(|preference| header_list::split(preference, ';').next()?.split_once('='))
             .find(|(name, _)| name.trim().eq_ignore_ascii_case("wait"))
             .and_then(|(_, value)| seconds(value.trim().trim_matches('"')))

@@ -1,12 +1,13 @@
 //! Which answers are compressed, and what is around that.
 
 use axum::body::{Body, HttpBody as _};
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use tower_http::compression::CompressionBody;
 use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
 
 use super::answers::{Answers, Constant, PIECE};
+use super::header_list;
 
 /// Streams are not compressed: each event must be sent at once.
 pub(super) fn worth_compressing() -> impl Predicate {
@@ -14,6 +15,22 @@ pub(super) fn worth_compressing() -> impl Predicate {
     SizeAbove::new(1024)
         .and(plain("text/event-stream"))
         .and(plain("application/x-ndjson"))
+}
+
+/// Codings of a caller up to this length, bytes, are left as they are.
+const FEW: usize = 1024;
+
+/// A request with no more codings than are looked at: `CompressionLayer` would weigh all of them.
+pub(super) fn shorten_codings<B>(mut request: http::Request<B>) -> http::Request<B> {
+    let lines = request.headers().get_all(header::ACCEPT_ENCODING);
+    if lines.iter().map(HeaderValue::len).sum::<usize>() > FEW {
+        let codings: Vec<&str> = header_list::entries(lines).collect();
+        let codings = HeaderValue::from_bytes(codings.join(",").as_bytes());
+        let codings = codings.expect("parts of header lines are one");
+        let headers = request.headers_mut();
+        headers.insert(header::ACCEPT_ENCODING, codings);
+    }
+    request
 }
 
 /// An answer before compression.
@@ -138,5 +155,28 @@ mod tests {
         let read = compressed.pop().expect("some").into_body().collect().await;
         assert!(read.expect("a body").to_bytes().len() < 10_000);
         assert!(is_coded(&sent(&answers, LONG).await));
+    }
+
+    #[test]
+    fn of_codings_without_end_the_first_are_kept() {
+        let shortened = |lines: &[&str]| {
+            let mut request = Request::new(());
+            for line in lines {
+                let line = HeaderValue::from_bytes(line.as_bytes()).expect("a value");
+                request.headers_mut().append(header::ACCEPT_ENCODING, line);
+            }
+            let request = shorten_codings(request);
+            let lines = request.headers().get_all(header::ACCEPT_ENCODING);
+            let lines = lines.iter().map(HeaderValue::as_bytes);
+            lines.map(<[u8]>::to_owned).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            shortened(&["gzip, br", "zstd"]),
+            [&b"gzip, br"[..], b"zstd"]
+        );
+        let lines = ["\u{e9};q=0.5,".repeat(60), "gzip,\t".repeat(1000)];
+        let kept = shortened(&lines.each_ref().map(String::as_str));
+        let expected = [vec!["\u{e9};q=0.5"; 60], vec![""], vec!["gzip"; 39]].concat();
+        assert_eq!(kept, [expected.join(",").into_bytes()]);
     }
 }

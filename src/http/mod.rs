@@ -60,7 +60,7 @@ use axum::http::Uri;
 use axum::routing::{self, MethodFilter, MethodRouter};
 use tokio::sync::watch;
 use tower::ServiceBuilder;
-use tower::util::MapResponseLayer;
+use tower::util::{MapRequestLayer, MapResponseLayer};
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
 
@@ -78,7 +78,7 @@ use crate::scenario::json::Rules;
 use crate::store::{Stats, SteadyClock, Store};
 use crate::telemetry::Instruments;
 use auth::{Access, Gate, Needs, Scope};
-use compression::{note_plain, send, worth_compressing};
+use compression::{note_plain, send, shorten_codings, worth_compressing};
 use head::HeadCheck;
 use layer::Layered;
 use problem::Problem;
@@ -269,6 +269,7 @@ fn wrap(
         .layer(cors.layer())
         .layer(CatchPanicLayer::custom(problem::after_panic))
         .layer(MapResponseLayer::new(move |answer| send(answer, &answers)))
+        .layer(MapRequestLayer::new(shorten_codings))
         .layer(CompressionLayer::new().compress_when(worth_compressing()))
         .layer(MapResponseLayer::new(note_plain))
         .layer(Layered(HeadCheck(hosts)));

@@ -13,6 +13,7 @@ use flate2::read::MultiGzDecoder;
 use http_body_util::{BodyExt as _, LengthLimitError, Limited};
 
 use super::bodies::{Bodies, Growing};
+use super::caller::Caller;
 use super::problem::Problem;
 use super::shown::Shown;
 use super::{AppState, off_thread};
@@ -21,15 +22,17 @@ use crate::import::Syntax;
 /// The whole body, which must be JSON.
 pub(super) async fn read_json(
     state: &AppState,
+    caller: &Caller,
     headers: &HeaderMap,
     body: Body,
 ) -> Result<Bytes, Problem> {
-    Announced::json(state, headers)?.read(body).await
+    Announced::json(state, headers)?.read(caller, body).await
 }
 
 /// The whole body, and whether it is declared as JSON or XML.
 pub(super) async fn read_json_or_xml(
     state: &AppState,
+    caller: &Caller,
     headers: &HeaderMap,
     body: Body,
 ) -> Result<(Bytes, Syntax), Problem> {
@@ -45,7 +48,7 @@ pub(super) async fn read_json_or_xml(
         }
     };
     let announced = Announced::of(state, headers)?;
-    Ok((announced.read(body).await?, syntax))
+    Ok((announced.read(caller, body).await?, syntax))
 }
 
 fn unsupported(headers: &HeaderMap, allowed: &'static str) -> Problem {
@@ -86,7 +89,7 @@ impl Announced {
     }
 
     /// The whole body.
-    pub(super) async fn read(&self, body: Body) -> Result<Bytes, Problem> {
+    pub(super) async fn read(&self, caller: &Caller, body: Body) -> Result<Bytes, Problem> {
         let (limit, timeout) = (self.limit, self.timeout);
         let sent = receive(body, limit, self.bodies.begin(limit));
         let sent = tokio::time::timeout(timeout, sent).await;
@@ -95,7 +98,7 @@ impl Announced {
             Coding::Plain => Ok(sent),
             Coding::Gzip => {
                 let plain = self.bodies.begin(limit);
-                off_thread::run(move || unpack(&sent, limit, plain)).await?
+                off_thread::run(caller, move || unpack(&sent, limit, plain)).await?
             }
         }
     }

@@ -41,8 +41,8 @@ pub(super) async fn result(
     let mut plan = caller.plan(&*state.store, id).await?;
     let choices = choices(&params, &headers)?;
     if partial && !plan.status.is_final() {
-        if let Some(so_far) = partial::result(&state, &plan).await? {
-            return written(&state, &plan, choices, so_far).await;
+        if let Some(so_far) = partial::result(&state, &caller, &plan).await? {
+            return written(&state, &caller, &plan, choices, so_far).await;
         }
         // A run that has ended meanwhile has a result instead of a route so far.
         plan = caller.plan(&*state.store, id).await?;
@@ -62,7 +62,7 @@ pub(super) async fn result(
             failure: plan.error,
         });
     };
-    written(&state, &plan, choices, stored).await
+    written(&state, &caller, &plan, choices, stored).await
 }
 
 /// A format for a result, and the requested options.
@@ -71,6 +71,7 @@ type Choice = (&'static Format, Options);
 /// A result in the first of `choices` in which it can be written.
 async fn written(
     state: &AppState,
+    caller: &Caller,
     plan: &Plan,
     choices: Vec<Choice>,
     result: String,
@@ -91,7 +92,7 @@ async fn written(
             };
             write_first(&choices, &input)
         };
-        state.terrains.over(scenario, write).await??
+        state.terrains.over(caller, scenario, write).await??
     };
     let headers = [
         (

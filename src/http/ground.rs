@@ -9,6 +9,7 @@ use axum::http::{HeaderMap, Uri};
 use bytes::Bytes;
 use serde::Serialize;
 
+use super::caller::Caller;
 use super::params::Params;
 use super::problem::Problem;
 use super::sampled::{between, to_the_centimetre};
@@ -51,6 +52,7 @@ enum Place {
 /// `POST /scenarios:ground`.
 pub(super) async fn sample(
     State(state): State<AppState>,
+    caller: Caller,
     uri: Uri,
     headers: HeaderMap,
     body: Body,
@@ -59,12 +61,12 @@ pub(super) async fn sample(
     let nodes = |name| params.within(name, &NODES, "a whole number");
     let columns = nodes("columns")?.unwrap_or(SOME_NODES);
     let rows = nodes("rows")?.unwrap_or(SOME_NODES);
-    let text = body::read_json(&state, &headers, body).await?;
+    let text = body::read_json(&state, &caller, &headers, body).await?;
     let rules = state.rules.clone();
     let sample = move |text: &Bytes| {
         json::read(text, &rules, 0).map(|scenario| sampled(&scenario, columns, rows))
     };
-    Ok(Json(state.terrains.over(text, sample).await??))
+    Ok(Json(state.terrains.over(&caller, text, sample).await??))
 }
 
 fn sampled(scenario: &Scenario, columns: usize, rows: usize) -> GroundDocument {

@@ -4,6 +4,7 @@
 use std::collections::VecDeque;
 
 use super::AppState;
+use super::caller::Caller;
 use super::problem::Problem;
 use crate::export::document::{Convergence, Incumbent, Origin, ResultDocument};
 use crate::job::{Event, Plan};
@@ -19,7 +20,11 @@ const CURVE: usize = 10_000;
 const PAGE: usize = 1_000;
 
 /// The document, or `None` when the run has not reported a route yet.
-pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<String>, Problem> {
+pub(super) async fn result(
+    state: &AppState,
+    caller: &Caller,
+    plan: &Plan,
+) -> Result<Option<String>, Problem> {
     let Some(best) = state.store.incumbent(plan.id).await? else {
         return Ok(None);
     };
@@ -39,7 +44,7 @@ pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<Strin
         let origin = plan.origin(scenario, run_ms.max(0) as f64);
         measure(scenario, &rules, best, lower, curve, origin).map(Some)
     };
-    state.terrains.over(scenario, measure).await?
+    state.terrains.over(caller, scenario, measure).await?
 }
 
 /// The curve of the present run, excluding an earlier one that was cut off.

@@ -99,7 +99,7 @@ pub(super) async fn resolve(
         let _room = room;
         serde_json::from_str(&result).map(|route: Route| route.within(&frame))
     };
-    let points = off_thread::run(read).await?.map_err(|error| {
+    let points = off_thread::run(caller, read).await?.map_err(|error| {
         tracing::error!(warm_start_plan_id = %plan, %error, "a stored result cannot be read");
         Problem::Internal
     })?;

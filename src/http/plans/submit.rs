@@ -49,9 +49,9 @@ pub(in crate::http) fn submit(
         {
             return Err(refusal);
         }
-        let bytes = asked.announced.read(body).await?;
+        let bytes = asked.announced.read(&caller, body).await?;
         let idempotency = match &asked.once {
-            Some(once) => Some(once.with(checksum(&bytes).await?)),
+            Some(once) => Some(once.with(checksum(&caller, &bytes).await?)),
             None => None,
         };
         let read = match draining {
@@ -240,12 +240,12 @@ async fn refusal_when_draining(state: &AppState) -> Result<Option<Problem>, Prob
 }
 
 /// The checksum of a document, off the request threads if it is long.
-async fn checksum(document: &Bytes) -> Result<String, Problem> {
+async fn checksum(caller: &Caller, document: &Bytes) -> Result<String, Problem> {
     if document.len() <= SHORT {
         return Ok(sha256_hex(document));
     }
     let document = document.clone();
-    Box::pin(off_thread::run(move || sha256_hex(&document))).await
+    Box::pin(off_thread::run(caller, move || sha256_hex(&document))).await
 }
 
 /// A document of this length, bytes, is read in less time than it takes to hand it to another thread.
@@ -270,10 +270,10 @@ async fn accept_slowly(
 ) -> Result<Submission, Problem> {
     let rules = state.rules.clone();
     let read = move |document: &Bytes| json::read(document, &rules, job::draw_seed());
-    let mut scenario = state.terrains.over(document, read).await??;
+    let mut scenario = state.terrains.over(caller, document, read).await??;
     warm_start::resolve(state, caller, &mut scenario).await?;
-    let (caller, now_ms) = (caller.clone(), state.clock.now_ms());
-    off_thread::run(move || submission(scenario, caller, now_ms)).await
+    let (owner, now_ms) = (caller.clone(), state.clock.now_ms());
+    off_thread::run(caller, move || submission(scenario, owner, now_ms)).await
 }
 
 fn submission(scenario: Scenario, caller: Caller, now_ms: i64) -> Submission {

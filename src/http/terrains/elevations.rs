@@ -13,6 +13,7 @@ use super::{Name, tagged};
 use crate::digest;
 use crate::geometry::geodesy::{LatLon, wrapped};
 use crate::http::AppState;
+use crate::http::caller::Caller;
 use crate::http::entity_tags::EntityTags;
 use crate::http::params::{self, Params};
 use crate::http::problem::Problem;
@@ -46,6 +47,7 @@ struct ElevationsDocument {
 /// `GET /terrains/{name}/elevations`.
 pub(in crate::http) async fn elevations(
     State(state): State<AppState>,
+    caller: Caller,
     Name(name): Name,
     uri: Uri,
     headers: HeaderMap,
@@ -54,7 +56,7 @@ pub(in crate::http) async fn elevations(
     let (datasets, known) = (state.rules.datasets.clone(), EntityTags::known(&headers));
     let sampled = state
         .terrains
-        .read(move || asked.sample(&*datasets, known.as_ref()))
+        .read(&caller, move || asked.sample(&*datasets, known.as_ref()))
         .await?;
     let (tag, document) = sampled.map_err(|error| refusal(error, &name))?;
     let answer = match document {

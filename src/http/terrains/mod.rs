@@ -74,7 +74,11 @@ impl Terrains {
         work: impl FnOnce(&dyn Catalogue) -> Result<T, CatalogueError> + Send + 'static,
     ) -> Result<T, Problem> {
         let catalogue = self.catalogue.clone();
-        Ok(self.records.run(move || work(&*catalogue)).await??)
+        // Short work, of which there is room for much: nobody's turn matters.
+        let records = self
+            .records
+            .run(&Caller::ANYBODY, move || work(&*catalogue));
+        Ok(records.await??)
     }
 
     /// How many there are, as far as is known at once; never waits behind other work.
@@ -87,23 +91,25 @@ impl Terrains {
     /// Do work that reads from datasets, once few enough others do.
     pub(super) async fn read<T: Send + 'static>(
         &self,
+        caller: &Caller,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Problem> {
-        self.reads.run(work).await
+        self.reads.run(caller, work).await
     }
 
-    /// Do work with a scenario: like other computing, unless that may need a dataset.
+    /// Do work with a scenario for a caller: like other computing, unless that may need a dataset.
     pub(super) async fn over<D: AsRef<[u8]> + Send + 'static, T: Send + 'static>(
         &self,
+        caller: &Caller,
         document: D,
         work: impl FnOnce(&D) -> T + Send + 'static,
     ) -> Result<T, Problem> {
         let reads_files = may_name_a_dataset(document.as_ref());
         let work = move || work(&document);
         if reads_files {
-            self.read(work).await
+            self.read(caller, work).await
         } else {
-            off_thread::run(work).await
+            off_thread::run(caller, work).await
         }
     }
 }
@@ -196,6 +202,7 @@ fn active(uses: &[DatasetUse], sha256: Option<&str>) -> u64 {
 /// `GET /terrains/{name}`.
 pub(super) async fn show(
     State(state): State<AppState>,
+    caller: Caller,
     Name(name): Name,
     _: NoParams,
     headers: HeaderMap,
@@ -203,7 +210,7 @@ pub(super) async fn show(
     let catalogue = state.terrains.catalogue.clone();
     let entry = state
         .terrains
-        .read(move || catalogue.entry(&name))
+        .read(&caller, move || catalogue.entry(&name))
         .await??;
     let content = entry.sha256.clone();
     let document = document(&state, entry).await?;

@@ -15,6 +15,7 @@ use tokio::time::Instant;
 use crate::catalogue::Staged;
 use crate::http::AppState;
 use crate::http::body::{Coding, announced_length, broken_off};
+use crate::http::caller::Caller;
 use crate::http::off_thread::Place;
 use crate::http::problem::Problem;
 
@@ -36,6 +37,7 @@ enum Piece {
 /// The whole body, once received, as a file, and its place among the uploads.
 pub(super) async fn receive(
     state: &AppState,
+    caller: &Caller,
     headers: &HeaderMap,
     body: Body,
 ) -> Result<(Staged, Place), Problem> {
@@ -44,7 +46,7 @@ pub(super) async fn receive(
     if announced_length(headers).is_some_and(|length| length > limit) {
         return Err(Problem::TerrainTooLarge(limit));
     }
-    let place = state.terrains.uploads.take(timeout).await;
+    let place = state.terrains.uploads.take(caller, timeout).await;
     let place = place.ok_or(Problem::TooManyUploads(super::UPLOADS))?;
     let staged = state.terrains.ask(move |catalogue| catalogue.stage(limit));
     let sink = Sink::new(staged.await?, coding);

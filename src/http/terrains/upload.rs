@@ -32,8 +32,8 @@ pub(in crate::http) async fn put(
     let naming = naming(&state, name, &caller, &headers);
     // Checked first, so that no long body is sent in vain.
     permit(&state.terrains, naming.clone()).await?;
-    let (staged, place) = receive(&state, &headers, body).await?;
-    let checked = check(&state.terrains, staged, said).await?;
+    let (staged, place) = receive(&state, &caller, &headers, body).await?;
+    let checked = check(&state.terrains, &caller, staged, said).await?;
     let (kept, entry) = keep(&state, &place, checked, naming).await?;
     let answer = answer(&state, entry).await?;
     Ok(match kept {
@@ -82,8 +82,13 @@ async fn permit(terrains: &Terrains, naming: Naming) -> Result<(), Problem> {
 }
 
 /// Read the file through. There are few uploads, so each waits for its turn however long that takes.
-async fn check(terrains: &Terrains, staged: Staged, said: Said) -> Result<Checked, Problem> {
-    let turn = terrains.checks.next().await;
+async fn check(
+    terrains: &Terrains,
+    caller: &Caller,
+    staged: Staged,
+    said: Said,
+) -> Result<Checked, Problem> {
+    let turn = terrains.checks.next(caller).await;
     let check = move || staged.check(said.format, said.declaration);
     Ok(turn.run(check).await??)
 }

@@ -169,10 +169,7 @@ impl Known {
     }
 
     fn kept(&self, id: PlanId) -> Option<&Record> {
-        match &*self.plans.get(&id)?.state {
-            State::Kept(record) => Some(record),
-            State::Buried(_) => None,
-        }
+        kept(self.plans.get(&id)?)
     }
 
     pub(super) fn is_queued(&self, id: PlanId) -> bool {
@@ -232,7 +229,7 @@ impl Known {
         };
         let mut plans: Vec<Plan> = older
             .rev()
-            .filter_map(|(id, _)| self.kept(*id))
+            .filter_map(|(_, standing)| kept(standing))
             .filter(|record| wanted(&record.plan))
             .take(query.limit)
             .map(|record| record.plan.clone())
@@ -274,8 +271,8 @@ impl Known {
 
     pub(super) fn datasets(&self) -> Vec<DatasetUse> {
         let mut uses: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
-        for id in self.plans.keys() {
-            if let Some(record) = self.kept(*id)
+        for standing in self.plans.values() {
+            if let Some(record) = kept(standing)
                 && let Some(dataset) = &record.dataset
             {
                 let (active, plans) = uses.entry(dataset).or_default();
@@ -425,6 +422,14 @@ impl Known {
             .collect();
         due.sort_unstable();
         due.into_iter().take(at_most).map(|(_, _, id)| id).collect()
+    }
+}
+
+/// The record of a plan, unless it has been removed.
+fn kept(standing: &Standing) -> Option<&Record> {
+    match &*standing.state {
+        State::Kept(record) => Some(record),
+        State::Buried(_) => None,
     }
 }
 

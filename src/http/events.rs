@@ -130,7 +130,9 @@ fn streamed(stream: Stream, wire: Wire) -> Response {
     let prologue = stream::iter([Ok(Bytes::from_static(wire.prologue().as_bytes()))]);
     let events = stream::unfold(stream, move |mut stream| async move {
         let span = stream.span.clone();
-        let text = stream.next(wire).instrument(span).await?;
+        let mut text = stream.next(wire).instrument(span).await?;
+        // It is kept for as long as its reader takes nothing.
+        text.shrink_to_fit();
         Some((Ok::<_, Infallible>(Bytes::from(text)), stream))
     });
     let headers = [

@@ -21,9 +21,9 @@ const PAGE: usize = 128;
 /// About so many bytes of them are given out at once, or one event: whoever takes nothing holds this much memory.
 const PAGE_BYTES: usize = 64 * 1024;
 
-/// Maximum number of pages read when the service stops: enough for what the last runs report in their last moments,
-/// including their end, and no more, so that nobody holds up the exit.
-const LAST_PAGES: usize = 16;
+/// About so many events are read when the service stops, at most: enough for what the last runs report in their last
+/// moments, including their end, and no more, so that nobody holds up the exit.
+const LAST_EVENTS: usize = 2_048;
 
 /// How much later than it happened an event of a run may be read: it is stored together with others.
 const LATE: Duration = Duration::from_millis(100);
@@ -64,8 +64,8 @@ pub(super) struct Feed {
     last_sent: Instant,
     /// Whether the reader has been given everything that the store had when last read.
     caught_up: bool,
-    /// Pages that may still be read once the service stops.
-    last_pages: usize,
+    /// Events that may still be read once the service stops.
+    last_events: usize,
     over: bool,
 }
 
@@ -89,7 +89,7 @@ impl Feed {
             held_since: None,
             last_sent: Instant::now(),
             caught_up: false,
-            last_pages: LAST_PAGES,
+            last_events: LAST_EVENTS,
             over: false,
         }
     }
@@ -131,14 +131,15 @@ impl Feed {
                 self.show_place_in_queue(&mut events).await;
             }
             shorten(&mut events);
+            let count = events.len();
             self.take(events, &mut out);
             if stopping && !self.over {
-                if quiet || self.last_pages == 0 {
+                if quiet || self.last_events == 0 {
                     // A reader who is further behind can read the rest from the next process.
                     self.over = true;
                     return Some(News::Stopping(out));
                 }
-                self.last_pages -= 1;
+                self.last_events = self.last_events.saturating_sub(count);
             }
             if !out.is_empty() {
                 return Some(News::Events(out));

@@ -478,6 +478,26 @@ async fn streams_end_when_the_service_stops() {
     plan.server.serving.await.expect("the server ends");
 }
 
+/// Few of their events are given out at once.
+#[tokio::test]
+async fn a_reader_of_long_routes_is_given_the_end_when_the_service_stops() {
+    let api = Api::new();
+    let address = api.submit().await;
+    let long = |iteration| {
+        let mut event = run::incumbent(iteration, iteration as f64);
+        if let Event::Incumbent(incumbent) = &mut event {
+            incumbent.waypoints = vec![incumbent.waypoints[0]; 202];
+        }
+        event
+    };
+    run::complete(&*api.store, (0..500).map(long).collect()).await;
+    api.phase.send_replace(Phase::Stopping);
+    let told = api.get(&format!("{address}/events?rate=0")).await.body;
+    let told = String::from_utf8_lossy(&told);
+    assert_eq!(told.matches("\nevent: incumbent\n").count(), 500);
+    assert_eq!(told.matches("\nevent: end\n").count(), 1);
+}
+
 #[tokio::test]
 async fn many_readers_of_one_plan_read_the_same_events() {
     for_every_backend(async |backend| {

@@ -77,22 +77,14 @@ impl Answers {
     /// Room for one answer that occupies so many bytes.
     pub(super) fn room(&self, bytes: u64) -> Result<Place, Problem> {
         let busy = Problem::Busy(Busy::Answers(self.0.bytes));
-        let share = Share {
-            bytes: self.0.take(bytes).ok_or(busy)?,
-            compressor: None,
-        };
-        let room = self.0.clone();
-        Ok(Place { share, room })
+        self.place(bytes, None).ok_or(busy)
     }
 
     /// Room for one answer of so many bytes that is compressed as it is sent; `None` where it has to be sent plain.
     pub(super) fn room_to_compress(&self, bytes: u64) -> Option<Place> {
         let compressors = self.0.compressors.clone();
         let compressor = (bytes > LONG).then(|| compressors.try_acquire_owned());
-        let compressor = compressor.transpose().ok()?;
-        let mut place = self.room(bytes + COMPRESSOR).ok()?;
-        place.share.compressor = compressor;
-        Some(place)
+        self.place(bytes + COMPRESSOR, compressor.transpose().ok()?)
     }
 
     /// Room for so many bytes out of the store that wait until an answer can be made of them; `None` if these are few,
@@ -100,6 +92,15 @@ impl Answers {
     pub(super) fn room_to_make_one(&self, bytes: usize) -> Result<Option<Place>, Problem> {
         let is_long = bytes > PIECE;
         is_long.then(|| self.room(bytes as u64)).transpose()
+    }
+
+    fn place(&self, bytes: u64, compressor: Option<OwnedSemaphorePermit>) -> Option<Place> {
+        let bytes = self.0.take(bytes)?;
+        let room = self.0.clone();
+        Some(Place {
+            share: Share { bytes, compressor },
+            room,
+        })
     }
 }
 

@@ -60,8 +60,8 @@ pub(super) fn note_plain(mut answer: Response) -> Response {
 /// The answer as it is sent: out of the room for answers if it occupies much of it, a refusal if there is none left.
 ///
 /// Only compressed ones keep a compressor, else every open stream would hold one; where there is no room for that, or
-/// enough other long answers are being compressed, the answer is plain. `CompressionLayer` answers 406 after the work is done if no coding is acceptable; we send the plain
-/// answer instead.
+/// enough other long answers are being compressed, the answer is plain. `CompressionLayer` answers 406 after the work
+/// is done if no coding is acceptable; we send the plain answer instead.
 pub(super) fn send(
     mut answer: http::Response<CompressionBody<Body>>,
     answers: &Answers,

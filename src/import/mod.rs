@@ -164,9 +164,10 @@ fn size_in_memory(text: &[u8]) -> usize {
 /// Nesting is limited by the library to 127 levels.
 fn json(text: &[u8]) -> Result<Value, ImportError> {
     if size_in_memory(text) > MOST_BYTES {
-        return Err(ImportError::no_scenario(
-            "it has so many values that they would take more than 128 MiB of memory: leave out what no scenario needs",
-        ));
+        let most = MOST_BYTES >> 20;
+        return Err(ImportError::no_scenario(format!(
+            "it has so many values that they would take more than {most} MiB of memory: leave out what no scenario needs"
+        )));
     }
     serde_json::from_slice(text).map_err(|error| ImportError::NotJson {
         line: error.line().max(1),

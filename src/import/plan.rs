@@ -196,10 +196,8 @@ fn is_above_home(item: &Value) -> bool {
 fn altitude(item: &Value, home: Option<Home>) -> Result<f64, String> {
     let height = &item["params"][6];
     let number = height.as_f64();
-    let number = || {
-        let height = shown(height);
-        number.ok_or_else(|| format!("has the altitude {height}, must be a number"))
-    };
+    let none = || format!("has the altitude {}, must be a number", shown(height));
+    let number = || number.ok_or_else(none);
     match item["frame"].as_u64() {
         Some(0 | 5) => number(),
         _ if is_above_home(item) => Ok(home_altitude(home)? + number()?),

@@ -13,7 +13,8 @@ use super::records::Name;
 use super::shared::Shared;
 use super::uploaded::Uploaded;
 use super::{
-    Catalogue, CatalogueError, Checked, Entry, GRACE, Kept, Mounted, Naming, Sharing, Staged, Tally,
+    Catalogue, CatalogueError, Checked, Entry, GRACE, Kept, Mounted, Naming, Room, Sharing, Staged,
+    Tally,
 };
 use crate::terrain::{DatasetError, Datasets, Found};
 
@@ -30,7 +31,7 @@ pub(super) trait Uploads: Debug + Send + Sync {
         &self,
         file: &Checked,
         naming: &Naming,
-        room: u64,
+        room: Room,
     ) -> Result<(Kept, Name), CatalogueError>;
     fn removable(&self, naming: &Naming) -> Result<String, CatalogueError>;
     fn remove(&self, naming: &Naming) -> Result<(), CatalogueError>;
@@ -190,7 +191,7 @@ impl Catalogue for Directories {
         &self,
         file: Checked,
         naming: &Naming,
-        room: u64,
+        room: Room,
     ) -> Result<(Kept, Entry), CatalogueError> {
         self.check_not_mounted(&naming.name)?;
         let (kept, record) = self.uploaded()?.keep(&file, naming, room)?;

@@ -54,6 +54,12 @@ pub enum CatalogueError {
         /// The greatest sum allowed.
         room: u64,
     },
+    /// There are as many uploads as there may be.
+    #[error("there are {most} uploads already")]
+    TooMany {
+        /// The greatest number allowed.
+        most: usize,
+    },
     /// More bytes were sent than a file may have.
     #[error("the file is longer than {limit} bytes")]
     TooLarge {

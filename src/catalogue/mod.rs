@@ -11,6 +11,7 @@ mod error;
 mod files;
 mod mounted;
 mod records;
+mod room;
 mod shared;
 mod shelf;
 mod shipped;
@@ -22,6 +23,7 @@ pub use content::{Checked, Declaration, Identity};
 pub use directories::Directories;
 pub use error::CatalogueError;
 pub use mounted::Mounted;
+pub use room::Room;
 pub use shared::Sharing;
 pub use shelf::{Change, Changes, Shelf, Source};
 pub use shipped::lay_down;
@@ -68,17 +70,18 @@ pub trait Catalogue: Datasets {
     fn permit(&self, naming: &Naming) -> Result<(), CatalogueError>;
 
     /// Keep a received file under a name, durably and atomically, where all uploads together need no more than `room`
-    /// bytes with it. Uploads that end at the same moment on several nodes may exceed it. Also returns what is known
-    /// about it, whatever is uploaded under the name right after.
+    /// with it. Uploads that end at the same moment on several nodes may exceed it. Also returns what is known about
+    /// it, whatever is uploaded under the name right after.
     ///
     /// # Errors
     /// [`CatalogueError::Mounted`], [`CatalogueError::Exists`], [`CatalogueError::Changed`],
-    /// [`CatalogueError::Owned`], [`CatalogueError::Full`], [`CatalogueError::Unavailable`].
+    /// [`CatalogueError::Owned`], [`CatalogueError::Full`], [`CatalogueError::TooMany`],
+    /// [`CatalogueError::Unavailable`].
     fn keep(
         &self,
         file: Checked,
         naming: &Naming,
-        room: u64,
+        room: Room,
     ) -> Result<(Kept, Entry), CatalogueError>;
 
     /// The checksum of the content to which a removable name refers.
@@ -142,14 +145,6 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Fails unless `more` bytes find room beside these.
-    fn admit(self, more: u64, room: u64) -> Result<(), CatalogueError> {
-        if self.bytes.saturating_add(more) > room {
-            return Err(CatalogueError::Full { room });
-        }
-        Ok(())
-    }
-
     fn plus(self, other: Self) -> Self {
         Self {
             datasets: self.datasets + other.datasets,

@@ -7,7 +7,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 
 use super::content::{Declaration, Identity};
 use super::stamp::Stamp;
@@ -129,7 +129,7 @@ impl Mounted {
 
     /// Log once that a file is not used.
     fn pass_over(&self, path: &Path, why: &str) {
-        if self.lock().passed_over.insert(path.to_owned()) {
+        if self.known.lock().passed_over.insert(path.to_owned()) {
             tracing::warn!(file = %path.display(), why, "a mounted file is not used");
         }
     }
@@ -169,7 +169,7 @@ impl Mounted {
     /// What is known about the file in its present state.
     fn remembered(&self, path: &Path) -> Result<Option<Look>, DemError> {
         let stamp = Stamp::of(path)?;
-        let known = self.lock().files.get(path).cloned();
+        let known = self.known.lock().files.get(path).cloned();
         Ok(known.filter(|look| look.stamp == stamp))
     }
 
@@ -192,11 +192,10 @@ impl Mounted {
     }
 
     fn remember(&self, path: &Path, look: &Look) {
-        self.lock().files.insert(path.to_owned(), look.clone());
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Known> {
-        self.known.lock()
+        self.known
+            .lock()
+            .files
+            .insert(path.to_owned(), look.clone());
     }
 }
 

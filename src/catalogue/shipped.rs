@@ -3,7 +3,7 @@
 
 use std::io::Write as _;
 
-use super::{Catalogue, CatalogueError, Claim, Declaration, Expected, Kept, Naming};
+use super::{Catalogue, CatalogueError, Claim, Declaration, Expected, Kept, Naming, Room};
 
 /// A ridge in Tennessee; scenarios/terrain/README.md gives its source.
 const NAME: &str = "jacksboro";
@@ -34,7 +34,7 @@ fn lay(catalogue: &dyn Catalogue, naming: &Naming) -> Result<Kept, CatalogueErro
         return Err(failure.expect("a write that fails says why"));
     }
     let checked = staged.check(None, Declaration::default())?;
-    let (kept, _) = catalogue.keep(checked, naming, u64::MAX)?;
+    let (kept, _) = catalogue.keep(checked, naming, Room::ENDLESS)?;
     Ok(kept)
 }
 

@@ -9,13 +9,13 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::content::Checked;
 use super::records::{Content, Name};
-use super::{CatalogueError, Entry, Kept, Naming, Staged, Tally, Uploads, files};
+use super::{CatalogueError, Entry, Kept, Naming, Room, Staged, Tally, Uploads, files};
 use crate::terrain::dem;
 use crate::terrain::{DatasetError, Found};
 
@@ -65,7 +65,7 @@ impl Uploaded {
                 .map_err(|error| CatalogueError::unavailable("removed", &path, error))?;
             tracing::info!(file = %path.display(), "removed an upload that was never finished");
         }
-        let mut state = self.lock();
+        let mut state = self.state.lock();
         for path in files::listed(&self.directory.join("content"))? {
             let stem = path.file_stem().and_then(|stem| stem.to_str());
             let Some(sha256) = stem.filter(|_| path.extension().is_some()) else {
@@ -99,7 +99,7 @@ impl Uploaded {
         &self,
         state: &mut State,
         file: &Checked,
-        room: u64,
+        room: Room,
     ) -> Result<(), CatalogueError> {
         let path = self.content(&file.sha256);
         if state.contents.contains_key(&file.sha256) && path.is_file() {
@@ -108,7 +108,7 @@ impl Uploaded {
         let content = Content::of(file);
         // What was lost from the disk is counted already.
         if !state.contents.contains_key(&file.sha256) {
-            state.tally().admit(content.bytes, room)?;
+            room.admit(state.contents.values(), content.bytes)?;
         }
         self.write(&path.with_extension("json"), &content)?;
         file.staged
@@ -131,15 +131,11 @@ impl Uploaded {
         files::write(&self.directory.join("incoming"), path, &text)
             .map_err(|error| CatalogueError::unavailable("written", path, error))
     }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock()
-    }
 }
 
 impl Uploads for Uploaded {
     fn entries(&self) -> Result<Vec<Entry>, CatalogueError> {
-        let names: Vec<String> = self.lock().names.keys().cloned().collect();
+        let names: Vec<String> = self.state.lock().names.keys().cloned().collect();
         let mut entries = Vec::new();
         for name in names {
             match self.entry(&name) {
@@ -155,7 +151,7 @@ impl Uploads for Uploaded {
     }
 
     fn tally(&self) -> Tally {
-        self.lock().tally()
+        self.state.lock().tally()
     }
 
     fn stage(&self, limit: u64) -> Result<Staged, CatalogueError> {
@@ -164,7 +160,7 @@ impl Uploads for Uploaded {
 
     fn find(&self, name: &str, sha256: Option<&str>) -> Result<Found, DatasetError> {
         let (sha256, declared) = {
-            let mut state = self.lock();
+            let mut state = self.state.lock();
             let named = state.names.get(name).map(|name| name.sha256.clone());
             let wanted = match (sha256, &named) {
                 (Some(sha256), _) => sha256.to_owned(),
@@ -192,7 +188,7 @@ impl Uploads for Uploaded {
 
     fn entry(&self, name: &str) -> Result<Entry, CatalogueError> {
         let known = {
-            let state = self.lock();
+            let state = self.state.lock();
             let known = state.names.get(name).cloned();
             known.and_then(|record| {
                 let content = state.contents.get(&record.sha256).cloned()?;
@@ -206,7 +202,7 @@ impl Uploads for Uploaded {
         let path = self.content(&record.sha256);
         let dataset = dem::open(&path, content.declared.declared()).map_err(|error| {
             // It may have been deleted and swept meanwhile.
-            let is_kept = self.lock().contents.contains_key(&record.sha256);
+            let is_kept = self.state.lock().contents.contains_key(&record.sha256);
             if is_kept { error.into() } else { unknown() }
         })?;
         Ok(Entry {
@@ -221,19 +217,22 @@ impl Uploads for Uploaded {
     }
 
     fn permit(&self, naming: &Naming) -> Result<(), CatalogueError> {
-        Name::permit(self.lock().names.get(&naming.name), naming)
+        Name::permit(self.state.lock().names.get(&naming.name), naming)
     }
 
     fn keep(
         &self,
         file: &Checked,
         naming: &Naming,
-        room: u64,
+        room: Room,
     ) -> Result<(Kept, Name), CatalogueError> {
         let name = naming.name.clone();
-        let mut state = self.lock();
+        let mut state = self.state.lock();
         let before = state.names.get(&name).cloned();
         Name::permit(before.as_ref(), naming)?;
+        if before.is_none() {
+            room.admit_one(state.names.len())?;
+        }
         self.keep_content(&mut state, file, room)?;
         let (kept, record) = Name::assigned(before.as_ref(), file, naming);
         if kept == Kept::Unchanged {
@@ -251,13 +250,13 @@ impl Uploads for Uploaded {
     }
 
     fn removable(&self, naming: &Naming) -> Result<String, CatalogueError> {
-        let state = self.lock();
+        let state = self.state.lock();
         Name::removable(state.names.get(&naming.name), naming).map(str::to_owned)
     }
 
     fn remove(&self, naming: &Naming) -> Result<(), CatalogueError> {
         let name = &*naming.name;
-        let mut state = self.lock();
+        let mut state = self.state.lock();
         Name::removable(state.names.get(name), naming)?;
         let path = self.name(name);
         files::remove(&path)
@@ -267,11 +266,11 @@ impl Uploads for Uploaded {
     }
 
     fn has_unnamed(&self) -> bool {
-        !self.lock().unnamed().is_empty()
+        !self.state.lock().unnamed().is_empty()
     }
 
     fn sweep(&self, used: &BTreeSet<String>) -> Result<usize, CatalogueError> {
-        let mut state = self.lock();
+        let mut state = self.state.lock();
         let mut removed = 0;
         for sha256 in state.unnamed() {
             let asked = state.asked.get(&sha256);

@@ -316,6 +316,13 @@ fn limits() -> Vec<Setting> {
             |c| &mut c.limits.terrains_bytes,
         ),
         row(
+            "limits.terrains",
+            "N",
+            "Names of uploaded datasets",
+            1..,
+            |c| &mut c.limits.terrains,
+        ),
+        row(
             "limits.peaks",
             "N",
             "Peaks of an analytic terrain",

@@ -18,6 +18,8 @@ pub struct Limits {
     pub terrain_bytes: u64,
     /// Size of all uploaded datasets together, bytes; checked when one more is to be kept.
     pub terrains_bytes: u64,
+    /// Uploaded datasets, by their names.
+    pub terrains: usize,
     /// Peaks of an analytic terrain.
     pub peaks: usize,
     /// Free waypoints, N.
@@ -42,6 +44,7 @@ impl Limits {
         terrain_nodes: usize::MAX,
         terrain_bytes: u64::MAX,
         terrains_bytes: u64::MAX,
+        terrains: usize::MAX,
         peaks: usize::MAX,
         waypoints: usize::MAX,
         population: usize::MAX,
@@ -60,6 +63,7 @@ impl Default for Limits {
             terrain_nodes: 4_000_000,
             terrain_bytes: 1 << 30,
             terrains_bytes: 1 << 34,
+            terrains: 10_000,
             peaks: 1_000,
             waypoints: 200,
             population: 10_000,

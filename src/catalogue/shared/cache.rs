@@ -104,7 +104,7 @@ impl Cache {
 
     /// Total length of all files, bytes.
     pub(super) fn bytes(&self) -> u64 {
-        self.lock().values().map(|held| held.bytes).sum()
+        self.files.lock().values().map(|held| held.bytes).sum()
     }
 
     /// Path of the file with this checksum, if it is cached and intact.
@@ -197,7 +197,7 @@ impl Cache {
 
     /// Remove the files that are not `needed`.
     pub(super) fn sweep(&self, needed: impl Fn(&str) -> bool) -> Result<(), CatalogueError> {
-        let held: Vec<String> = self.lock().keys().cloned().collect();
+        let held: Vec<String> = self.files.lock().keys().cloned().collect();
         for sha256 in held.iter().filter(|sha256| !needed(sha256)) {
             let _lane = self.lane(sha256);
             if !self.was_asked_lately(sha256) {
@@ -210,7 +210,7 @@ impl Cache {
     /// Remove the least recently used files until the others fit.
     fn make_room(&self) -> Result<(), CatalogueError> {
         let mut oldest: Vec<(Option<Instant>, String, u64)> = {
-            let files = self.lock();
+            let files = self.files.lock();
             let files = files.iter();
             files
                 .map(|(sha256, held)| (held.asked, sha256.clone(), held.bytes))
@@ -232,13 +232,13 @@ impl Cache {
     }
 
     fn was_asked_lately(&self, sha256: &str) -> bool {
-        let asked = self.lock().get(sha256).and_then(|held| held.asked);
+        let asked = self.files.lock().get(sha256).and_then(|held| held.asked);
         asked.is_some_and(|asked| asked.elapsed() < self.grace)
     }
 
     /// Whether the file is unchanged since its checksum was verified; also marks it as used.
     fn is_known(&self, sha256: &str, stamp: Stamp) -> bool {
-        let mut files = self.lock();
+        let mut files = self.files.lock();
         let held = files.get_mut(sha256);
         held.filter(|held| held.stamp == Some(stamp))
             .map(|held| held.asked = Some(Instant::now()))
@@ -251,11 +251,11 @@ impl Cache {
             stamp: Some(stamp),
             asked: Some(Instant::now()),
         };
-        self.lock().insert(sha256.to_owned(), held);
+        self.files.lock().insert(sha256.to_owned(), held);
     }
 
     fn drop_file(&self, sha256: &str) -> Result<(), CatalogueError> {
-        self.lock().remove(sha256);
+        self.files.lock().remove(sha256);
         remove(&self.path(sha256))
     }
 
@@ -267,10 +267,6 @@ impl Cache {
         let sum = sha256.bytes().map(usize::from).sum::<usize>();
         let lane = &self.lanes[sum % LANES];
         lane.lock()
-    }
-
-    fn lock(&self) -> MutexGuard<'_, HashMap<String, Held>> {
-        self.files.lock()
     }
 }
 

@@ -8,7 +8,7 @@ use super::Shared;
 use super::headers::Headers;
 use super::view::{Shelved, View, content_key};
 use crate::catalogue::records::Content;
-use crate::catalogue::{CatalogueError, Checked, Staged};
+use crate::catalogue::{CatalogueError, Checked, Room, Staged};
 use crate::terrain::DatasetError;
 
 /// Most attempts to fetch a file: one put a moment ago may not have reached every server.
@@ -36,7 +36,7 @@ impl Shared {
     }
 
     /// Make sure that a content is on the shelf and not about to be removed.
-    pub(super) fn shelve(&self, file: &Checked, room: u64) -> Result<(), CatalogueError> {
+    pub(super) fn shelve(&self, file: &Checked, room: Room) -> Result<(), CatalogueError> {
         let sha256 = &file.sha256;
         loop {
             let view = self.view()?;
@@ -47,7 +47,8 @@ impl Shared {
                 continue;
             }
             let content = Content::of(file);
-            view.tally().admit(content.bytes, room)?;
+            let contents = view.contents.values().map(|shelved| &shelved.content);
+            room.admit(contents, content.bytes)?;
             let mut bytes = file
                 .staged
                 .reader()

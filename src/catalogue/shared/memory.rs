@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::io::{self, Write};
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 
 use crate::catalogue::{Change, Changes, Shelf, Source};
 
@@ -37,30 +37,30 @@ pub(super) enum Trouble {
 impl Memory {
     /// Cause trouble at the call after `calls` more.
     pub(super) fn trouble_in(&self, calls: usize, trouble: Trouble) {
-        let mut state = self.lock();
+        let mut state = self.0.lock();
         state.trouble = Some((state.calls + calls, trouble));
     }
 
     /// Cancel the trouble; returns whether it had not happened yet.
     pub(super) fn calm(&self) -> bool {
-        self.lock().trouble.take().is_some()
+        self.0.lock().trouble.take().is_some()
     }
 
     /// Make the shelf unreachable, or reachable again.
     pub(super) fn be_away(&self, away: bool) {
-        self.lock().away = away;
+        self.0.lock().away = away;
     }
 
     /// Number of complete and of incomplete files.
     pub(super) fn counts(&self) -> [usize; 2] {
-        let state = self.lock();
+        let state = self.0.lock();
         let whole = state.files.values().filter(|(_, whole)| *whole).count();
         [whole, state.files.len() - whole]
     }
 
     /// Write a value that no catalogue would write.
     pub(super) fn scribble(&self, key: &str, value: &str) {
-        let expected = self.lock().keys.get(key).map_or(0, |written| written.1);
+        let expected = self.0.lock().keys.get(key).map_or(0, |written| written.1);
         let written = self.write(key, value, expected);
         written
             .expect("it can be reached")
@@ -68,7 +68,7 @@ impl Memory {
     }
 
     fn call<T>(&self, work: impl FnOnce(&mut State, bool) -> io::Result<T>) -> io::Result<T> {
-        let mut state = self.lock();
+        let mut state = self.0.lock();
         state.calls += 1;
         let due = matches!(state.trouble, Some((call, _)) if call < state.calls);
         let trouble = if due { state.trouble.take() } else { None };
@@ -88,13 +88,9 @@ impl Memory {
             Some((_, Trouble::Interrupted(meanwhile))) => {
                 drop(state);
                 meanwhile();
-                work(&mut self.lock(), true)
+                work(&mut self.0.lock(), true)
             }
         }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.0.lock()
     }
 }
 

@@ -25,7 +25,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use serde::Serialize;
 
 pub use self::sharing::Sharing;
@@ -35,7 +35,7 @@ use self::retire::Watched;
 use self::view::{View, name_key};
 use super::directories::Uploads;
 use super::records::Name;
-use super::{CatalogueError, Checked, Entry, Kept, Naming, Shelf, Staged, Tally};
+use super::{CatalogueError, Checked, Entry, Kept, Naming, Room, Shelf, Staged, Tally};
 use crate::telemetry::Instruments;
 use crate::terrain::dem;
 use crate::terrain::{DatasetError, Found};
@@ -126,10 +126,6 @@ impl Shared {
             owner: record.owner.clone(),
         })
     }
-
-    fn watched(&self) -> MutexGuard<'_, Watched> {
-        self.watched.lock()
-    }
 }
 
 impl Uploads for Shared {
@@ -175,7 +171,7 @@ impl Uploads for Shared {
         &self,
         file: &Checked,
         naming: &Naming,
-        room: u64,
+        room: Room,
     ) -> Result<(Kept, Name), CatalogueError> {
         // Before sending bytes in vain.
         self.permit(naming)?;
@@ -185,6 +181,9 @@ impl Uploads for Shared {
             let view = self.view()?;
             let before = view.names.get(&naming.name);
             Name::permit(before, naming)?;
+            if before.is_none() {
+                room.admit_one(view.names.len())?;
+            }
             let (kept, record) = Name::assigned(before, file, naming);
             let is_so =
                 kept == Kept::Unchanged || self.write(&key, &record, view.written(&key))?.is_some();
@@ -193,7 +192,7 @@ impl Uploads for Shared {
             }
         };
         // A removal of the content that began before it had the name is either complete now or will see the name.
-        self.shelve(file, u64::MAX)?;
+        self.shelve(file, Room::ENDLESS)?;
         if let Err(error) = self.cache.adopt(file) {
             tracing::warn!(%error, "an uploaded dataset is not kept on this node; it will be fetched");
         }
@@ -218,12 +217,12 @@ impl Uploads for Shared {
 
     fn has_unnamed(&self) -> bool {
         let view = self.view();
-        let looks = self.is_time_to_look(&self.watched());
+        let looks = self.is_time_to_look(&self.watched.lock());
         looks || view.is_ok_and(|view| !view.unnamed().is_empty())
     }
 
     fn sweep(&self, used: &BTreeSet<String>) -> Result<usize, CatalogueError> {
-        let mut watched = self.watched();
+        let mut watched = self.watched.lock();
         let removed = self.retire_all(used, &mut watched)?;
         self.tidy(&mut watched)?;
         drop(watched);

@@ -92,6 +92,9 @@ impl Problem {
             Self::TerrainsFull(room) => {
                 format!("with this dataset, all uploaded ones would be longer than {room} bytes, the limit terrains_bytes of GET /limits; delete some first")
             }
+            Self::TooManyTerrains(most) => {
+                format!("there are {most} uploaded datasets, with replaced ones that are still kept, as many as the limit terrains of GET /limits allows; delete some first")
+            }
             Self::UploadStalled(limit) => {
                 let limit = limit.as_secs_f64();
                 let slowest = SLOWEST / 1024.0;

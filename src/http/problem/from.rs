@@ -117,6 +117,7 @@ impl From<CatalogueError> for Problem {
             CatalogueError::Unreadable(_) => Self::InvalidTerrain(detail),
             CatalogueError::TooLarge { limit } => Self::TerrainTooLarge(limit),
             CatalogueError::Full { room } => Self::TerrainsFull(room),
+            CatalogueError::TooMany { most } => Self::TooManyTerrains(most),
             CatalogueError::Unavailable { error, .. } => {
                 tracing::error!(error = detail, "the datasets cannot be reached");
                 Self::StoreUnavailable(Some(match error.kind() {

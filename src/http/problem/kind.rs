@@ -168,7 +168,7 @@ impl Problem {
                 "body-too-large",
                 "The body is too large",
             ),
-            Self::TerrainsFull(_) => (
+            Self::TerrainsFull(_) | Self::TooManyTerrains(_) => (
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "terrains-full",
                 "The datasets have no more room",

@@ -61,6 +61,8 @@ pub(super) enum Problem {
     TerrainTooLarge(u64),
     /// All datasets together would be too long; the limit in bytes.
     TerrainsFull(u64),
+    /// There are as many uploaded datasets as there may be.
+    TooManyTerrains(usize),
     /// A dataset came too slowly; how long it may pause.
     UploadStalled(Duration),
     /// The maximum number of datasets is being uploaded.

@@ -7,7 +7,7 @@ use axum::response::Response;
 
 use super::receive::receive;
 use super::{Name, Terrains, check_name, document, etag, json, naming, tagged};
-use crate::catalogue::{Checked, Declaration, Entry, Kept, Naming, Staged};
+use crate::catalogue::{Checked, Declaration, Entry, Kept, Naming, Room, Staged};
 use crate::http::AppState;
 use crate::http::caller::Caller;
 use crate::http::off_thread::Place;
@@ -101,7 +101,11 @@ async fn keep(
     naming: Naming,
 ) -> Result<(Kept, Entry), Problem> {
     let sha256 = checked.sha256().to_owned();
-    let room = state.rules.limits.terrains_bytes;
+    let limits = state.rules.limits;
+    let room = Room {
+        bytes: limits.terrains_bytes,
+        datasets: limits.terrains,
+    };
     // What was deleted a moment ago must not take room.
     if let Err(error) = sweep_datasets(&*state.store, &state.terrains.catalogue).await {
         tracing::debug!(%error, "datasets were not swept before an upload");

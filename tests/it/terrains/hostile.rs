@@ -452,6 +452,31 @@ async fn datasets_beyond_the_room_for_all_are_refused_and_leave_nothing() {
     assert_eq!(kept(&api.uploads()), [2, 2, 0]);
 }
 
+/// Names are limited too: neither new content nor a new name for the old one is kept beyond them.
+#[tokio::test]
+async fn datasets_beyond_their_number_are_refused_and_leave_nothing() {
+    let api = with_limits(|limits| limits.terrains = 2);
+    let (first, second, third) = (hill(100.0), hill(250.0), hill(300.0));
+    for (name, file, status) in [
+        ("first", &first, 201),
+        ("second", &second, 201),
+        ("first", &first, 200),
+    ] {
+        let answer = put(&api, &format!("/terrains/{name}"), file.clone()).await;
+        assert_eq!(answer.status, status, "{answer:?}");
+    }
+    for file in [third, first] {
+        let refused = put(&api, "/terrains/third", file.clone()).await;
+        let problem = refused.expect_problem(413, "terrains-full");
+        let detail = problem["detail"].as_str().expect("text");
+        assert!(detail.contains("2 uploaded datasets"), "{detail}");
+        assert_eq!(kept(&api.uploads()), [4, 2, 0]);
+    }
+    assert_eq!(api.delete("/terrains/second").await.status, 204);
+    let answer = put(&api, "/terrains/third", second).await;
+    assert_eq!(answer.status, 201, "{answer:?}");
+}
+
 /// A deleted dataset leaves its room at once, unless a plan was planned over it.
 #[tokio::test]
 async fn a_deleted_dataset_leaves_its_room_once_no_plan_needs_it() {

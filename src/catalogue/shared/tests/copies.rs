@@ -9,7 +9,7 @@ use super::{Node, height, hill, naming, sharing, two_with};
 use crate::catalogue::directories::Uploads as _;
 use crate::catalogue::shared::Shared;
 use crate::catalogue::shared::memory::{Memory, Trouble};
-use crate::catalogue::{CatalogueError, Declaration};
+use crate::catalogue::{CatalogueError, Declaration, Room};
 use crate::telemetry::metrics::Queue;
 use crate::terrain::DatasetError;
 
@@ -103,7 +103,7 @@ fn nodes_with_one_directory_have_a_cache_each() {
     });
     let checked = checked.expect("there is room");
     nodes[0]
-        .keep(&checked, &naming("hill"), u64::MAX)
+        .keep(&checked, &naming("hill"), Room::ENDLESS)
         .expect("kept");
     for node in &nodes {
         assert_eq!(height(&node.find("hill", None).expect("found")), 9);

@@ -6,24 +6,46 @@ use std::sync::mpsc;
 use super::{Node, height, naming, two};
 use crate::catalogue::directories::Uploads as _;
 use crate::catalogue::shared::memory::Trouble;
-use crate::catalogue::{CatalogueError, Claim, Expected, Kept, Naming};
+use crate::catalogue::{CatalogueError, Claim, Expected, Kept, Naming, Room};
 use crate::terrain::DatasetError;
 
 #[test]
 fn nodes_share_the_room_for_all_files() {
     let (_, a, b) = two();
     let (first, second) = (a.checked(100), b.checked(250));
-    let room = first.staged.bytes() + second.staged.bytes() - 1;
+    let bytes = first.staged.bytes() + second.staged.bytes() - 1;
+    let room = Room {
+        bytes,
+        ..Room::ENDLESS
+    };
     a.shared
         .keep(&first, &naming("hill"), room)
         .expect("room for one");
     let kept = b.shared.keep(&second, &naming("other"), room);
-    assert!(matches!(kept, Err(CatalogueError::Full { room: told }) if told == room));
+    assert!(matches!(kept, Err(CatalogueError::Full { room }) if room == bytes));
     assert_eq!(a.shared.tally().datasets, 1);
     let kept = b.shared.keep(&b.checked(100), &naming("other"), room);
     assert_eq!(kept.expect("the content is there").0, Kept::Created);
-    let kept = b.shared.keep(&second, &naming("other"), room + 1);
+    let kept = b.shared.keep(&second, &naming("other"), Room::ENDLESS);
     assert_eq!(kept.expect("room for both").0, Kept::Replaced);
+}
+
+#[test]
+fn nodes_share_the_number_of_names() {
+    let (_, a, b) = two();
+    let room = Room {
+        datasets: 1,
+        ..Room::ENDLESS
+    };
+    let checked = a.checked(100);
+    let keep = |node: &Node, name| node.shared.keep(&checked, &naming(name), room);
+    assert_eq!(keep(&a, "hill").expect("room for one").0, Kept::Created);
+    for name in ["other", "third"] {
+        let kept = keep(&b, name);
+        assert!(matches!(kept, Err(CatalogueError::TooMany { most: 1 })));
+    }
+    assert_eq!(keep(&b, "hill").expect("it is there").0, Kept::Unchanged);
+    assert_eq!(a.shared.tally().datasets, 1);
 }
 
 #[test]
@@ -73,7 +95,9 @@ fn who_expects_something_else_or_owns_nothing_is_refused_on_every_node() {
     let keep = |node: &Node, height: u32, naming: &Naming| {
         let checked = node.checked(height);
         let sha256 = checked.sha256().to_owned();
-        node.shared.keep(&checked, naming, u64::MAX).map(|_| sha256)
+        node.shared
+            .keep(&checked, naming, Room::ENDLESS)
+            .map(|_| sha256)
     };
     let first = keep(&a, 1, &naming("ada", Expected::Nothing)).expect("it is new");
     let refused = |error: CatalogueError, expected: &str| {
@@ -112,11 +136,11 @@ fn of_two_replacements_one_is_refused() {
         let (tell, told) = mpsc::channel();
         let theirs = naming.clone();
         let meanwhile = move || {
-            let kept = b.shared.keep(&b.checked(2), &theirs, u64::MAX);
+            let kept = b.shared.keep(&b.checked(2), &theirs, Room::ENDLESS);
             tell.send(kept).expect("somebody listens");
         };
         shelf.trouble_in(step, Trouble::Interrupted(Box::new(meanwhile)));
-        let ours = a.shared.keep(&a.checked(3), &naming, u64::MAX);
+        let ours = a.shared.keep(&a.checked(3), &naming, Room::ENDLESS);
         let Ok(theirs) = told.try_recv() else {
             assert!(step > 5 && shelf.calm() && ours.is_ok(), "step {step}");
             continue;

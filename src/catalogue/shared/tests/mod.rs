@@ -16,7 +16,7 @@ use tempfile::TempDir;
 use super::memory::Memory;
 use super::{Shared, Sharing};
 use crate::catalogue::directories::Uploads as _;
-use crate::catalogue::{CatalogueError, Checked, Claim, Declaration, Expected, Kept, Naming};
+use crate::catalogue::{CatalogueError, Checked, Claim, Declaration, Expected, Kept, Naming, Room};
 use crate::geometry::geodesy::LatLon;
 use crate::telemetry::Instruments;
 use crate::terrain::{DatasetError, Found};
@@ -66,7 +66,7 @@ impl Node {
     pub(super) fn keep(&self, name: &str, height: u32) -> Result<Kept, CatalogueError> {
         let kept = self
             .shared
-            .keep(&self.checked(height), &naming(name), u64::MAX);
+            .keep(&self.checked(height), &naming(name), Room::ENDLESS);
         kept.map(|(kept, _)| kept)
     }
 

@@ -127,9 +127,6 @@ fn search_to_the_end(model: &Model, log: &mut Log) -> StopReason {
         None => search::plain(model, log),
         Some(starts) => {
             let mut reason = search::guided(model, starts, log);
-            if reason == StopReason::Iterations && log.has_converged() {
-                reason = StopReason::Converged;
-            }
             if reason == StopReason::Iterations && backwards::is_worthwhile(model, log) {
                 reason = backwards::search(model, log);
             }

@@ -37,7 +37,7 @@ const PER_LEG: usize = 3;
 const SECTOR: f64 = std::f64::consts::FRAC_PI_4;
 
 impl<'s> Course<'s> {
-    /// The coding for routes of `scenario` with `waypoints` free waypoints, and as many vectors.
+    /// The coding for routes of `scenario` with so many `legs`, each a vector.
     #[must_use]
     pub(in crate::planner) fn new(scenario: &'s Scenario, legs: usize) -> Self {
         let way = scenario.target - scenario.start;

@@ -14,7 +14,7 @@ const CLEAR: f64 = 0.02;
 /// Number of directions in which a climb can begin.
 const DIRECTIONS: usize = 24;
 
-/// Maximum number of threats around a place whose heights are considered.
+/// Maximum number of heights beside the middle at one place: those nearest to it, and the farthest.
 const MOST: usize = 4;
 
 /// Heights nearer to each other than this share of the band count as one.

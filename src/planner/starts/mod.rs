@@ -71,16 +71,17 @@ pub(super) struct Starts {
 
 /// Where the search of `model` starts; `None` for the algorithm alone.
 pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
-    from(Shapes::find, model, stop)
+    starts_from(Shapes::find, model, stop)
 }
 
 /// As [`routes`], where a search from those has found no route that keeps every limit: along ledges too; `None` where
 /// there are none.
 pub(super) fn along_ledges(model: &Model, stop: &dyn Stop) -> Option<Starts> {
-    from(Shapes::find_with_ledges, model, stop)
+    starts_from(Shapes::find_with_ledges, model, stop)
 }
 
-fn from(
+/// What `find` returns, brought to one number of waypoints, from the cheapest on; then refined, and seen in a wider band.
+fn starts_from(
     find: impl Fn(&Model, &dyn Fn() -> bool) -> Shapes,
     model: &Model,
     stop: &dyn Stop,

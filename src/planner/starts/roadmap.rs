@@ -109,7 +109,9 @@ fn legs_unwatched(scenario: &Scenario) -> usize {
         Terrain::Flat(_) | Terrain::Grid(_) | Terrain::Dem(_) => 0,
     };
     let met = peaks + scenario.threats.iter().map(Threat::effort).sum::<usize>();
-    (MET_UNWATCHED / met.max(1)).next_multiple_of(LANES)
+    (MET_UNWATCHED / met.max(1))
+        .next_multiple_of(LANES)
+        .max(LANES)
 }
 
 /// Whether so much may be met that even single routes take long to price.
@@ -408,6 +410,10 @@ mod tests {
         let (few, is_empty) = priced(&scenario, 2);
         assert!(is_empty);
         assert!(0 < few && few <= 3 * most && 3 * most < all, "{few} {all}");
+        // However much there is, some legs are priced before the next check.
+        let coast = scenario.threats.pop().expect("pushed");
+        scenario.threats = vec![coast; 51];
+        assert_eq!(legs_unwatched(&scenario), LANES);
     }
 
     /// Chains are the same whether legs are measured on demand or all beforehand.

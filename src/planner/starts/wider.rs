@@ -37,7 +37,8 @@ pub(super) fn routes(
     let best = costs.fold(f64::INFINITY, f64::min);
     let mut scenario = model.scenario.clone();
     let more = WIDER * (scenario.altitude.max - scenario.altitude.min);
-    scenario.altitude.min -= more;
+    // Not below ground: a leg is priced by how deep it leads below its floor.
+    scenario.altitude.min = (scenario.altitude.min - more).max(0.0);
     scenario.altitude.max += more;
     let wide = Model::new(&scenario);
     let is_over = || why_stop(model.scenario, stop).is_some();
@@ -79,9 +80,11 @@ pub(super) fn routes(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Point2;
     use crate::planner::tests::{disc, peaks, scenario};
     use crate::planner::{Nobody, plan};
     use crate::scenario::{AltitudeBand, Scenario, Seeding};
+    use crate::terrain::{Grid, Terrain};
 
     /// Two mountains and five discs: the best route begins with a leg of 700 m that touches both limits of the band.
     fn between_mountains() -> Scenario {
@@ -136,5 +139,28 @@ mod tests {
             assert!(!price(&model, route).is_feasible());
         }
         assert!(beyond(550.0).is_empty());
+    }
+
+    /// A band near the ground is not made to begin below it, where a grid's legs would all break a limit.
+    #[test]
+    fn a_band_near_the_ground_is_widened_too() {
+        const NODES: usize = 101;
+        let mut scenario = between_mountains();
+        let node = |idx: usize| Point2::new((idx % NODES) as f64, (idx / NODES) as f64) * 10.0;
+        let elevations = (0..NODES * NODES).map(|idx| scenario.terrain.elevation(node(idx)));
+        scenario.terrain = Terrain::Grid(Grid {
+            origin: Point2::origin(),
+            cell: 10.0,
+            columns: NODES,
+            rows: NODES,
+            elevations: elevations.collect(),
+        });
+        scenario.altitude.min = 40.0;
+        let worst = Fitness {
+            violation: 0.0,
+            cost: 1e4,
+        };
+        let (found, _) = routes(&Model::new(&scenario), &[(worst, Vec::new())], &Nobody);
+        assert!(!found.is_empty());
     }
 }

@@ -104,7 +104,7 @@ pub(super) fn planner(
 /// Population, iterations and waypoints.
 fn sizes(fields: &Fields<'_>, limits: &Limits, faults: &mut Faults) -> [Option<usize>; 3] {
     let mut size = |name, default: usize, least: usize, most| {
-        // What is left out is never refused.
+        // A size that is left out never exceeds its own limit.
         let default = default.min(most).max(least);
         fields.or(name, default, faults, |at, faults| {
             at.count(least, (name, most), faults)

@@ -176,6 +176,24 @@ mod tests {
         }
     }
 
+    /// A way may end with a place right above or below the target, where rounding leaves less than nothing of it.
+    #[test]
+    fn a_climb_may_end_above_the_target() {
+        let mut scenario = steep([100.0, 0.0, 45.0, 60.0], 10);
+        scenario.start = Point3::new(60.0, 50.0, 0.0);
+        scenario.target = Point3::new(50.0, 50.0, 100.0);
+        scenario.area = Rect {
+            min: Point2::new(0.0, 0.0),
+            max: Point2::new(100.0, 100.0),
+        };
+        (scenario.altitude.min, scenario.altitude.max) = (80.0, 120.0);
+        scenario.vehicle.min_leg = 0.0;
+        let routes = routes(&Model::new(&scenario), &|| false).routes;
+        assert!(!routes.is_empty());
+        let heights = routes.iter().flatten().map(|place| place.z);
+        assert!(heights.into_iter().all(f64::is_finite));
+    }
+
     /// Complete plans, not only their starts, with an upper bound for each cost.
     #[test]
     fn steep_climbs_are_planned_at_low_cost() {

@@ -284,7 +284,8 @@ impl<'m, 's> Ways<'m, 's> {
             left -= length;
             let mut z = scenario.terrain.elevation(at) + self.climb.height;
             for (end, way) in [(scenario.start, flown), (scenario.target, left)] {
-                let reach = way * self.steepest;
+                // What is left of a sum is not exactly 0 after its last part.
+                let reach = way.max(0.0) * self.steepest;
                 z = z.clamp(end.z - reach, end.z + reach);
             }
             route.push(Point3::new(at.x, at.y, z));

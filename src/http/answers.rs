@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use axum::BoxError;
 use axum::body::{Body, Bytes, HttpBody};
+use axum::response::{IntoResponse, Response};
 use hyper::body::{Frame, SizeHint};
 use parking_lot::Mutex;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -36,7 +37,19 @@ const COMPRESSORS: usize = 4;
 
 /// Among an answer's extensions, marks one that occupies nothing of its own: it is a part of the program.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Constant;
+struct Constant;
+
+/// Mark an answer as a part of the program.
+pub(super) fn constant(answer: impl IntoResponse) -> Response {
+    let mut answer = answer.into_response();
+    answer.extensions_mut().insert(Constant);
+    answer
+}
+
+/// Whether the answer is a part of the program.
+pub(super) fn is_constant<B>(answer: &http::Response<B>) -> bool {
+    answer.extensions().get::<Constant>().is_some()
+}
 
 /// The room for all long answers.
 #[derive(Debug, Clone)]
@@ -82,9 +95,13 @@ impl Answers {
 
     /// Room for one answer of so many bytes that is compressed as it is sent; `None` where it has to be sent plain.
     pub(super) fn room_to_compress(&self, bytes: u64) -> Option<Place> {
-        let compressors = self.0.compressors.clone();
-        let compressor = (bytes > LONG).then(|| compressors.try_acquire_owned());
-        self.place(bytes + COMPRESSOR, compressor.transpose().ok()?)
+        let one = || self.0.compressors.clone().try_acquire_owned().ok();
+        let compressor = if bytes > LONG {
+            Some(self.0.or_without_the_unread(one)?)
+        } else {
+            None
+        };
+        self.place(bytes + COMPRESSOR, compressor)
     }
 
     /// Room for so many bytes out of the store that wait until an answer can be made of them; `None` if these are few,
@@ -148,10 +165,14 @@ impl Room {
     fn take(&self, bytes: u64) -> Option<OwnedSemaphorePermit> {
         let bytes = self.bytes.min(usize::try_from(bytes).ok()?);
         let bytes = u32::try_from(bytes).ok()?;
-        let share = || self.free.clone().try_acquire_many_owned(bytes).ok();
-        share().or_else(|| {
+        self.or_without_the_unread(|| self.free.clone().try_acquire_many_owned(bytes).ok())
+    }
+
+    /// What is asked for, now or once those who do not read have made room.
+    fn or_without_the_unread<T>(&self, ask: impl Fn() -> Option<T>) -> Option<T> {
+        ask().or_else(|| {
             self.let_go_of_the_unread();
-            share()
+            ask()
         })
     }
 

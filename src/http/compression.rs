@@ -6,7 +6,7 @@ use axum::response::{IntoResponse as _, Response};
 use tower_http::compression::CompressionBody;
 use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
 
-use super::answers::{Answers, Constant, PIECE};
+use super::answers::{Answers, PIECE, is_constant};
 use super::header_list;
 
 /// Streams are not compressed: each event must be sent at once.
@@ -79,7 +79,7 @@ pub(super) fn send(
         answer.headers_mut().remove(header::CONTENT_ENCODING);
     }
     let answer = answer.map(CompressionBody::into_inner);
-    if length <= PIECE as u64 || answer.extensions().get::<Constant>().is_some() {
+    if length <= PIECE as u64 || is_constant(&answer) {
         return answer;
     }
     match answers.room(length) {
@@ -155,6 +155,22 @@ mod tests {
         let read = compressed.pop().expect("some").into_body().collect().await;
         assert!(read.expect("a body").to_bytes().len() < 10_000);
         assert!(is_coded(&sent(&answers, LONG).await));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn callers_who_take_nothing_do_not_keep_others_answers_plain() {
+        let patience = Duration::from_secs(60);
+        let answers = Answers::new(1 << 24, patience);
+        let mut unread = Vec::new();
+        while let answer = sent(&answers, 100_000).await
+            && is_coded(&answer)
+        {
+            unread.push(answer);
+            assert!(unread.len() < 100);
+        }
+        tokio::time::sleep(patience + Duration::from_secs(1)).await;
+        assert!(is_coded(&sent(&answers, 100_000).await));
+        assert!(unread.remove(0).into_body().collect().await.is_err());
     }
 
     #[test]

@@ -113,12 +113,7 @@ impl Feed {
             self.changes.mark_unchanged();
             let page = match self.store.events(self.id, self.after, PAGE).await {
                 Ok(page) => page,
-                Err(StoreError::Gone(tombstone)) => return self.removed(tombstone.end),
-                Err(StoreError::NotFound(_)) => return self.removed(None),
-                Err(error) => {
-                    tracing::warn!(%error, "a stream of events broke off");
-                    break;
-                }
+                Err(error) => return self.broken(error),
             };
             if page.forgotten > self.after {
                 return self.skip(page.forgotten).await;
@@ -179,11 +174,13 @@ impl Feed {
                 to: forgotten,
             });
         }
-        let plan = self.store.get(self.id).await.ok()?;
-        Some(News::Events(vec![NumberedEvent {
-            id: forgotten,
-            event: Event::Status(Box::new(plan)),
-        }]))
+        match self.store.get(self.id).await {
+            Ok(plan) => Some(News::Events(vec![NumberedEvent {
+                id: forgotten,
+                event: Event::Status(Box::new(plan)),
+            }])),
+            Err(error) => self.broken(error),
+        }
     }
 
     /// If the plan still waits, its newest event says where it was in the queue when it got there. A new reader is shown
@@ -200,6 +197,19 @@ impl Feed {
         match self.store.get(self.id).await {
             Ok(plan) if plan.status == Status::Queued => **shown = plan,
             _ => {}
+        }
+    }
+
+    /// The store has no more of the plan, or fails.
+    fn broken(&mut self, error: StoreError) -> Option<News> {
+        match error {
+            StoreError::Gone(tombstone) => self.removed(tombstone.end),
+            StoreError::NotFound(_) => self.removed(None),
+            error => {
+                tracing::warn!(%error, "a stream of events broke off");
+                self.over = true;
+                None
+            }
         }
     }
 

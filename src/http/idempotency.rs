@@ -43,15 +43,11 @@ impl InFlight {
             return Ok(None);
         };
         let key = (caller.owner.clone(), key);
-        if !self.lock().insert(key.clone()) {
+        if !self.0.lock().insert(key.clone()) {
             return Err(Problem::IdempotencyInFlight);
         }
         let keys = self.clone();
         Ok(Some(Once { keys, key }))
-    }
-
-    fn lock(&self) -> parking_lot::MutexGuard<'_, HashSet<Key>> {
-        self.0.lock()
     }
 }
 
@@ -74,7 +70,7 @@ impl Once {
 
 impl Drop for Once {
     fn drop(&mut self) {
-        self.keys.lock().remove(&self.key);
+        self.keys.0.lock().remove(&self.key);
     }
 }
 

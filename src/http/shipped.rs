@@ -5,10 +5,11 @@ use std::sync::LazyLock;
 use axum::Json;
 use axum::extract::Path;
 use axum::http::{Uri, header};
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::answers::constant;
 use super::params::NoParams;
 use super::problem::Problem;
 
@@ -79,7 +80,8 @@ pub(super) async fn show(
     let Some((_, text)) = SHIPPED.iter().find(|(name, _)| *name == wanted) else {
         return Err(Problem::no_such_resource(&uri));
     };
-    Ok(([(header::CONTENT_TYPE, "application/json")], *text).into_response())
+    let media_type = [(header::CONTENT_TYPE, "application/json")];
+    Ok(constant((media_type, *text)))
 }
 
 #[cfg(test)]

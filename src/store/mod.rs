@@ -1,4 +1,4 @@
-//! Where plans are kept: the contract that every store meets, and the table of stores.
+//! Where plans are kept: the contract that every store meets, and the stores.
 //!
 //! A store holds the queue, the records, the documents and the events of all plans, and makes each
 //! step durable before it answers. Deliberately absent: what a plan means, and who may see it.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::error::Error;
+use std::fmt::Display;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -34,24 +35,37 @@ impl Drop for Sweeper {
 }
 
 async fn sweep(store: Arc<dyn Store>, catalogue: Arc<dyn Catalogue>, clock: Clock) {
-    let mut sound = true;
+    let [mut plans, mut datasets] = [Sound(true); 2];
     loop {
         tokio::time::sleep(PERIOD).await;
-        loop {
+        let swept = loop {
             match store.sweep(clock()).await {
-                Ok(SWEEP) => continue,
-                Ok(_) => sound = true,
-                Err(error) if sound => {
-                    tracing::warn!(%error, "plans past their time could not be removed; trying again");
-                    sound = false;
-                }
-                Err(_) => {}
+                Ok(SWEEP) => {}
+                swept => break swept.err(),
             }
-            break;
+        };
+        plans.note(swept.as_ref(), "plans past their time could not be removed");
+        let swept = sweep_datasets(&*store, &catalogue).await.err();
+        datasets.note(
+            swept.as_ref(),
+            "datasets that nothing refers to were not looked for",
+        );
+    }
+}
+
+/// Whether something worked when it was last tried.
+#[derive(Clone, Copy)]
+struct Sound(bool);
+
+impl Sound {
+    /// Tell of the first of several failures.
+    fn note(&mut self, failure: Option<&impl Display>, what: &str) {
+        if let Some(error) = failure
+            && self.0
+        {
+            tracing::warn!(%error, "{what}; trying again");
         }
-        if let Err(error) = sweep_datasets(&*store, &catalogue).await {
-            tracing::debug!(%error, "datasets were not swept; trying again");
-        }
+        self.0 = failure.is_none();
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 
 use crate::job::Owner;
 
@@ -48,7 +48,7 @@ impl Streams {
 
     /// Permission for one more stream. Callers without a name are limited by `most` alone.
     pub(super) fn open(self: &Arc<Self>, owner: Option<Owner>) -> Result<Permit, TooMany> {
-        let mut open = self.lock();
+        let mut open = self.open.lock();
         let too_many = |limit, most| Err(TooMany { limit, most });
         if open.all >= self.most {
             return too_many("streams", self.most);
@@ -65,15 +65,11 @@ impl Streams {
         let streams = self.clone();
         Ok(Permit { streams, owner })
     }
-
-    fn lock(&self) -> MutexGuard<'_, Open> {
-        self.open.lock()
-    }
 }
 
 impl Drop for Permit {
     fn drop(&mut self) {
-        let mut open = self.streams.lock();
+        let mut open = self.streams.open.lock();
         open.all -= 1;
         let Some(owner) = &self.owner else {
             return;
@@ -105,6 +101,6 @@ mod tests {
         let _again = open("a").expect("room again");
         drop(other);
         let _third = open("b").expect("room again");
-        assert_eq!(streams.lock().by_owner.len(), 2);
+        assert_eq!(streams.open.lock().by_owner.len(), 2);
     }
 }

@@ -14,7 +14,7 @@ use flate2::write::GzEncoder;
 
 use crate::digest::sha256_hex;
 use crate::http::accept::takes;
-use crate::http::answers::Constant;
+use crate::http::answers::constant;
 use crate::http::entity_tags::EntityTags;
 use crate::http::params::NoParams;
 use crate::http::problem::Problem;
@@ -187,8 +187,7 @@ fn serve(name: &str, uri: &Uri, headers: &HeaderMap) -> Result<Response, Problem
     if EntityTags::known(headers).is_some_and(|known| known.contain(&tag)) {
         return Ok((StatusCode::NOT_MODIFIED, common).into_response());
     }
-    let mut response = (common, bytes).into_response();
-    response.extensions_mut().insert(Constant);
+    let mut response = constant((common, bytes));
     let answered = response.headers_mut();
     answered.insert(header::CONTENT_TYPE, file.media_type());
     if let Some(name) = coding.name() {

@@ -18,6 +18,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
+use super::answers::constant;
 use super::params::NoParams;
 use super::problem::Problem;
 
@@ -36,13 +37,19 @@ static DESCRIPTION: LazyLock<Value> = LazyLock::new(|| {
 
 /// `GET /openapi.yaml`.
 pub(super) async fn openapi_yaml(_: NoParams) -> Result<Response, Problem> {
-    Ok(([(header::CONTENT_TYPE, "application/yaml")], OPENAPI_YAML).into_response())
+    Ok(constant((
+        [(header::CONTENT_TYPE, "application/yaml")],
+        OPENAPI_YAML,
+    )))
 }
 
 /// `GET /openapi.json`.
 pub(super) async fn openapi_json(_: NoParams) -> Result<Response, Problem> {
     static JSON: LazyLock<String> = LazyLock::new(|| DESCRIPTION.to_string());
-    Ok(([(header::CONTENT_TYPE, "application/json")], JSON.as_str()).into_response())
+    Ok(constant((
+        [(header::CONTENT_TYPE, "application/json")],
+        JSON.as_str(),
+    )))
 }
 
 /// `GET /docs`.
@@ -51,7 +58,7 @@ pub(super) async fn docs(_: NoParams) -> Result<Response, Problem> {
         let title = "Noctule: reference of the HTTP interface";
         page(title, &reference::body(&DESCRIPTION))
     });
-    Ok(html(&PAGE))
+    Ok(constant(html(PAGE.as_str())))
 }
 
 /// `GET /problems/{slug}`: the page that a problem's `type` links to.
@@ -70,7 +77,7 @@ pub(super) async fn problem(
         markdown::html(&text.replace("](#", "]("))
     );
     let title = text.lines().next().unwrap_or_default();
-    Ok(html(&page(title.trim_start_matches("## "), &body)))
+    Ok(html(page(title.trim_start_matches("## "), &body)))
 }
 
 /// The section about the problem called `slug`, with its heading.
@@ -92,7 +99,7 @@ fn page(title: &str, body: &str) -> String {
     )
 }
 
-fn html(page: &str) -> Response {
+fn html(page: impl IntoResponse) -> Response {
     static POLICY: LazyLock<HeaderValue> = LazyLock::new(|| {
         let hash = BASE64.encode(Sha256::digest(STYLE));
         let policy = format!(
@@ -108,7 +115,7 @@ fn html(page: &str) -> Response {
         ),
         (header::CONTENT_SECURITY_POLICY, POLICY.clone()),
     ];
-    (headers, page.to_owned()).into_response()
+    (headers, page).into_response()
 }
 
 /// `text` escaped for use in an element or an attribute.

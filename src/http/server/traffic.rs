@@ -12,7 +12,7 @@ use std::time::Duration;
 use axum::body::{Body, Bytes};
 use axum::response::Response;
 use hyper::body::{Frame, SizeHint};
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use tokio::time::Instant;
 
 /// Among an answer's extensions, marks one that may have nothing to say for as long as it likes: it keeps its connection
@@ -72,13 +72,13 @@ impl Traffic {
 
     /// A request has come. The connection counts as active until it is answered.
     pub(super) fn begin(self: Arc<Self>) -> Busy {
-        self.state().busy += 1;
+        self.state.lock().busy += 1;
         Busy(self)
     }
 
     /// The caller has taken this many bytes.
     pub(super) fn sent(&self, bytes: usize) {
-        let mut state = self.state();
+        let mut state = self.state.lock();
         state.held_up = false;
         state.taken = Instant::now();
         state.unnoted += bytes;
@@ -89,22 +89,22 @@ impl Traffic {
 
     /// The caller does not take the next data for now.
     pub(super) fn hold_up(&self) {
-        self.state().held_up = true;
+        self.state.lock().held_up = true;
     }
 
     /// Whether data is waiting that the caller does not take.
     pub(super) fn is_held_up(&self) -> bool {
-        self.state().held_up
+        self.state.lock().held_up
     }
 
     /// Part of what the caller sends is not read.
     pub(super) fn leave_unread(&self) {
-        self.state().unread = true;
+        self.state.lock().unread = true;
     }
 
     /// Whether the caller may still be sending what is not read.
     pub(super) fn is_unread(&self) -> bool {
-        self.state().unread
+        self.state.lock().unread
     }
 
     /// Returns once there has been no traffic for `time`, counted from now at the earliest.
@@ -113,15 +113,11 @@ impl Traffic {
         loop {
             tokio::time::sleep_until(due).await;
             let now = Instant::now();
-            due = self.state().moved(now, self.reader_patience) + time;
+            due = self.state.lock().moved(now, self.reader_patience) + time;
             if due <= now {
                 return;
             }
         }
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock()
     }
 }
 
@@ -163,7 +159,7 @@ impl Busy {
 
 impl Drop for Busy {
     fn drop(&mut self) {
-        let mut state = self.0.state();
+        let mut state = self.0.state.lock();
         state.busy -= 1;
         state.note();
     }
@@ -174,20 +170,20 @@ struct Reader(Arc<Traffic>);
 
 impl Reader {
     fn new(traffic: Arc<Traffic>) -> Self {
-        traffic.state().readers += 1;
+        traffic.state.lock().readers += 1;
         let reader = Self(traffic);
         reader.asks();
         reader
     }
 
     fn asks(&self) {
-        self.0.state().asked = Instant::now();
+        self.0.state.lock().asked = Instant::now();
     }
 }
 
 impl Drop for Reader {
     fn drop(&mut self) {
-        let mut state = self.0.state();
+        let mut state = self.0.state.lock();
         state.readers -= 1;
         state.note();
     }

@@ -122,6 +122,9 @@ async fn deliver_all(delivery: Arc<Delivery>, mut end: watch::Receiver<bool>) {
                 continue;
             }
         }
+        if tasks.len() >= AT_ONCE {
+            continue;
+        }
         let now_ms = (delivery.clock)();
         let due = match delivery.store.due_webhooks(now_ms, AT_ONCE).await {
             Ok(due) => due,

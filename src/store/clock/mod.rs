@@ -112,7 +112,6 @@ impl SteadyClock {
 
     /// Ask the judge with what the followed clock shows and the time elapsed, milliseconds.
     fn ask<T>(&self, question: impl FnOnce(&mut Judge, i64, i64) -> T) -> T {
-        // The state is consistent after every look, so a panic leaves nothing wrong behind.
         let mut judge = self.judge.lock();
         let shown_ms = (self.followed)();
         let passed_ms = i64::try_from((self.passed)().as_millis()).unwrap_or(i64::MAX);

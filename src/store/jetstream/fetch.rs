@@ -1,12 +1,10 @@
 //! A lane's jobs, as the servers deliver them.
 
-use std::collections::HashMap;
 use std::time::Duration;
 
 use async_nats::jetstream::consumer::{AckPolicy, PullConsumer, pull};
 use async_nats::jetstream::{AckKind, Message};
 use futures_util::StreamExt as _;
-use parking_lot::MutexGuard;
 
 use super::JetStream;
 use super::connect::PATIENCE;
@@ -91,13 +89,13 @@ impl JetStream {
             .unwrap_or_else(|_| Err(refused(&what(), "no server answered")));
         if fetched.is_err() {
             // It may have been removed after a long time without use.
-            self.consumers().remove(lane);
+            self.consumers.lock().remove(lane);
         }
         fetched
     }
 
     async fn consumer(&self, lane: &Lane) -> Result<PullConsumer, StoreError> {
-        if let Some(consumer) = self.consumers().get(lane) {
+        if let Some(consumer) = self.consumers.lock().get(lane) {
             return Ok(consumer.clone());
         }
         let config = pull::Config {
@@ -113,12 +111,8 @@ impl JetStream {
         };
         let made = self.servers.jobs.create_consumer(config).await;
         let consumer = made.map_err(|error| failed(&format!("lane {}", lane.name()), &error))?;
-        self.consumers().insert(lane.clone(), consumer.clone());
+        self.consumers.lock().insert(lane.clone(), consumer.clone());
         Ok(consumer)
-    }
-
-    fn consumers(&self) -> MutexGuard<'_, HashMap<Lane, PullConsumer>> {
-        self.consumers.lock()
     }
 }
 

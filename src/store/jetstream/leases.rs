@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use async_nats::jetstream::AckKind;
 use async_nats::jetstream::message::Acker;
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
@@ -35,10 +35,6 @@ struct Held {
 pub(super) type Job = std::sync::Arc<Acker>;
 
 impl Leases {
-    fn held(&self) -> MutexGuard<'_, HashMap<PlanId, Held>> {
-        self.0.lock()
-    }
-
     /// Hold a job from now on; returns what tells its run to stop.
     pub(super) fn hold(
         &self,
@@ -57,7 +53,7 @@ impl Leases {
             appended: 0,
             steps: RunSteps::default(),
         };
-        if let Some(before) = self.held().insert(id, held) {
+        if let Some(before) = self.0.lock().insert(id, held) {
             before.renewing.abort();
         }
         cancelled
@@ -65,7 +61,8 @@ impl Leases {
 
     /// A job was delivered again while it is being done here: the servers missed a renewal. True when so.
     pub(super) fn again(&self, id: PlanId, attempt: u64, job: &Job) -> bool {
-        self.held()
+        self.0
+            .lock()
             .get(&id)
             .filter(|held| held.attempt == attempt)
             .map(|held| held.job.send_replace(job.clone()))
@@ -75,7 +72,7 @@ impl Leases {
     /// A plan has changed; its run here is stopped when that was requested, or when it is no longer ours. States may
     /// come late, when newer ones have been heeded already.
     pub(super) fn heed(&self, id: PlanId, state: &State) {
-        let all = self.held();
+        let all = self.0.lock();
         let Some(held) = all.get(&id) else { return };
         let order = Order::to_run(held.attempt, state);
         if order != Order::GoOn {
@@ -89,14 +86,15 @@ impl Leases {
 
     /// Number of the step that a run appended last.
     pub(super) fn appended_last(&self, id: PlanId, attempt: u64) -> Option<u64> {
-        let all = self.held();
+        let all = self.0.lock();
         let held = all.get(&id).filter(|held| held.attempt == attempt)?;
         Some(held.appended)
     }
 
     pub(super) fn appended(&self, id: PlanId, attempt: u64, number: u64) {
         if let Some(held) = self
-            .held()
+            .0
+            .lock()
             .get_mut(&id)
             .filter(|held| held.attempt == attempt)
         {
@@ -111,14 +109,14 @@ impl Leases {
         attempt: u64,
         look: impl FnOnce(&mut RunSteps) -> T,
     ) -> Option<T> {
-        let mut all = self.held();
+        let mut all = self.0.lock();
         let held = all.get_mut(&id).filter(|held| held.attempt == attempt)?;
         Some(look(&mut held.steps))
     }
 
     /// Let go of a run; returns its job, if it was held.
     pub(super) fn let_go(&self, id: PlanId, attempt: u64) -> Option<Job> {
-        let mut all = self.held();
+        let mut all = self.0.lock();
         if all.get(&id).is_none_or(|held| held.attempt != attempt) {
             return None;
         }
@@ -129,7 +127,8 @@ impl Leases {
 
     /// The runs that are held, with their attempts.
     pub(super) fn all(&self) -> Vec<(PlanId, u64)> {
-        self.held()
+        self.0
+            .lock()
             .iter()
             .map(|(id, held)| (*id, held.attempt))
             .collect()
@@ -161,7 +160,7 @@ impl Order {
 
 impl Drop for Leases {
     fn drop(&mut self) {
-        for held in self.held().values() {
+        for held in self.0.lock().values() {
             held.renewing.abort();
         }
     }

@@ -184,6 +184,15 @@ impl JetStreamStore {
         }
         Ok(&self.store)
     }
+
+    /// Fails while the servers have plans that are not known here yet.
+    fn check_current(&self) -> Result<(), StoreError> {
+        if *self.reading.borrow() == Reading::Current {
+            return Ok(());
+        }
+        let what = "the plans on the servers are being read";
+        Err(StoreError::unavailable(what))
+    }
 }
 
 impl Drop for JetStreamStore {
@@ -312,6 +321,8 @@ impl Store for JetStreamStore {
     }
 
     async fn datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError> {
+        // What the servers have said since might name others.
+        self.check_current()?;
         Ok(self.open_store()?.view.known().datasets())
     }
 
@@ -330,12 +341,7 @@ impl Store for JetStreamStore {
         }
         store.look_at_streams().await?;
         store.announce().await?;
-        if *self.reading.borrow() != Reading::Current {
-            return Err(StoreError::unavailable(
-                "the plans on the servers are being read",
-            ));
-        }
-        Ok(())
+        self.check_current()
     }
 
     fn warning(&self) -> Option<String> {

@@ -98,7 +98,7 @@ impl JetStream {
         if self.apart_ms().is_some() {
             i64::MIN
         } else {
-            now_ms
+            self.options.expiry_ms(now_ms)
         }
     }
 

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::time::Duration;
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use tokio::time::Instant;
 
 use crate::job::PlanId;
@@ -40,7 +40,7 @@ impl Orphans {
     /// The record of this job is missing.
     pub(super) fn miss(&self, id: PlanId) -> Orphan {
         let now = Instant::now();
-        let mut missed = self.missed();
+        let mut missed = self.missed.lock();
         missed.retain(|_, since| now.duration_since(*since) < FORGOTTEN);
         let since = *missed.entry(id).or_insert(now);
         let age = now.duration_since(since);
@@ -53,16 +53,12 @@ impl Orphans {
 
     /// Whether this job has come without a record before.
     pub(super) fn is_known(&self, id: PlanId) -> bool {
-        self.missed().contains_key(&id)
+        self.missed.lock().contains_key(&id)
     }
 
     /// The record of this job is found.
     pub(super) fn found(&self, id: PlanId) {
-        self.missed().remove(&id);
-    }
-
-    fn missed(&self) -> MutexGuard<'_, HashMap<PlanId, Instant>> {
-        self.missed.lock()
+        self.missed.lock().remove(&id);
     }
 }
 

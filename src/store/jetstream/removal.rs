@@ -111,14 +111,14 @@ impl JetStream {
 
     /// Remove a tombstone, and what an interrupted removal has left.
     async fn forget_tombstone(&self, id: PlanId) -> Result<(), StoreError> {
-        let purged = self.servers.purge_steps(id).await;
-        let purged = purged.map_err(|error| failed(&format!("tombstone of plan {id}"), &error))?;
+        // Its documents first: afterwards nothing names them.
         if let Some(standing) = self.view.standing(id)
             && let State::Buried(grave) = &*standing.state
-            && purged.purged > 1
         {
             self.servers.remove_documents(id, &grave.objects).await?;
         }
+        let purged = self.servers.purge_steps(id).await;
+        purged.map_err(|error| failed(&format!("tombstone of plan {id}"), &error))?;
         self.view.forget(id);
         Ok(())
     }

@@ -151,7 +151,15 @@ impl JetStream {
             self.servers.write(&scenario, &submission.scenario),
             self.enqueue(id, lane, &mark)
         );
-        let place = match document.and(job) {
+        let place = match (document, job) {
+            (Ok(()), Ok(place)) => Ok(place),
+            (Err(error), Ok(place)) => {
+                self.withdraw(id, place).await;
+                Err(error)
+            }
+            (Err(error), Err(_)) | (Ok(()), Err(error)) => Err(error),
+        };
+        let place = match place {
             Ok(place) => place,
             Err(error) => {
                 // If this fails too, what remains of it is removed with its job.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use noctule::job::{Event, Idempotency, Status, Submission};
 use noctule::store::jetstream::JetStreamStore;
-use noctule::store::{Options, Retention, Store, wall_clock};
+use noctule::store::{Options, Retention, SteadyClock, Store, StoreError, wall_clock};
 
 use super::open;
 use crate::support::nats::{self, NatsServer, namespace};
@@ -91,6 +91,39 @@ async fn a_wrong_clock_never_takes_over_a_run() {
         until(&**accepting, id, |plan| plan.status == Status::Succeeded).await;
         assert_eq!(history_to_its_end(&**accepting, id).await.len(), 4);
     }
+}
+
+/// The servers' clock may be wrong as well, as on a machine that began with a wrong time and runs them too.
+#[tokio::test(flavor = "multi_thread")]
+async fn nothing_expires_by_a_clock_that_is_far_ahead_of_all_records() {
+    const DAY_MS: i64 = 24 * 60 * 60 * 1_000;
+    let address = nats::address();
+    let open = async |ahead_ms: i64| {
+        let clock = SteadyClock::following(Arc::new(move || wall_clock()() + ahead_ms));
+        let options = Options {
+            retention: Retention {
+                age_ms: Some(DAY_MS),
+                ..Retention::default()
+            },
+            ..Options::new(1_000)
+        };
+        let opened = JetStreamStore::open(node(&address), options.by(&clock)).await;
+        opened.unwrap()
+    };
+    let (right, now_ms) = (open(0).await, wall_clock()());
+    let [kept, deleted] = [(); 2].map(|()| submission());
+    let [kept, deleted] = [right.submit(kept).await, right.submit(deleted).await]
+        .map(|accepted| accepted.unwrap().plan.id);
+    for id in [kept, deleted] {
+        right.request_cancel(id, now_ms).await.unwrap();
+    }
+    right.delete(deleted, now_ms).await.unwrap();
+
+    let ahead = open(2 * DAY_MS).await;
+    assert_eq!(ahead.sweep(now_ms + 2 * DAY_MS).await.unwrap(), 0);
+    assert!(ahead.get(kept).await.is_ok());
+    let gone = ahead.get(deleted).await;
+    assert!(matches!(gone, Err(StoreError::Gone(_))), "{gone:?}");
 }
 
 /// A clock that is a day fast would expire the plans of all nodes, and forget what was deleted.

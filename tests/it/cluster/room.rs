@@ -163,6 +163,9 @@ async fn a_plan_refused_for_want_of_room_takes_up_none() {
     };
     assert_eq!(trouble(store.submit(third).await), Some(Trouble::Full));
     assert_eq!(large(&address).await, before);
+    let jobs = format!("{}-jobs", namespace(&address));
+    let mut jobs = client(&address).await.get_stream(jobs).await.unwrap();
+    assert_eq!(jobs.info().await.unwrap().state.messages, 2);
     for id in accepted {
         store.delete(id, 0).await.unwrap();
     }

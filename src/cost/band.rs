@@ -56,7 +56,7 @@ impl TerminalZones {
         }
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &TerminalZone> {
+    pub(super) fn iter(&self) -> std::slice::Iter<'_, TerminalZone> {
         self.zones.iter()
     }
 

@@ -145,6 +145,18 @@ impl Draft {
         }
     }
 
+    /// A circle that is drawn as a ring, if these are the facts of one: they say its `center` and its `radius`.
+    pub(super) fn drawn_circle(&mut self, at: &str, facts: &Facts) -> bool {
+        let (Some([lon, lat]), Ok(Some(_))) = (facts.center(), facts.number("radius")) else {
+            return false;
+        };
+        match Place::new(lon, lat) {
+            Ok(center) => self.circle(at, facts, center),
+            Err(reason) => self.leave(at, reason),
+        }
+        true
+    }
+
     /// The outer ring of a polygon, closed or not.
     pub(super) fn polygon(&mut self, at: &str, facts: &Facts, ring: &[[f64; 2]]) {
         match polygon(facts, ring) {

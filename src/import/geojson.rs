@@ -73,15 +73,10 @@ fn feature(draft: &mut Draft, at: &str, value: JsonValue) {
 
 /// A geometry. `within` points to it, and so does `at` within a collection; otherwise `at` points to its feature.
 fn geometry(draft: &mut Draft, at: &str, within: &str, facts: &Facts, value: &GeometryValue) {
-    // A circle that is drawn as a ring has a `center` and a `radius`.
-    if let (GeometryValue::Polygon { .. } | GeometryValue::MultiPolygon { .. }, Some([lon, lat])) =
-        (value, facts.center())
-        && let Ok(Some(_)) = facts.number("radius")
+    if let GeometryValue::Polygon { .. } | GeometryValue::MultiPolygon { .. } = value
+        && draft.drawn_circle(at, facts)
     {
-        return match Place::new(lon, lat) {
-            Ok(center) => draft.circle(at, facts, center),
-            Err(reason) => draft.leave(at, reason),
-        };
+        return;
     }
     match value {
         GeometryValue::Point { coordinates } => point(draft, at, facts, coordinates),

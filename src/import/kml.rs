@@ -127,14 +127,8 @@ fn is_shape(node: &Node) -> bool {
 impl Placemark {
     fn geometry(&mut self, draft: &mut Draft, node: &Node, depth: usize) {
         let (at, facts) = (&self.at, &self.facts);
-        if let Some([lon, lat]) = facts.center()
-            && is(node, "Polygon")
-            && let Ok(Some(_)) = facts.number("radius")
-        {
-            return match Place::new(lon, lat) {
-                Ok(center) => draft.circle(at, facts, center),
-                Err(reason) => draft.leave(at, reason),
-            };
+        if is(node, "Polygon") && draft.drawn_circle(at, facts) {
+            return;
         }
         match node.tag_name().name() {
             "Point" => point(draft, at, facts, node),

@@ -7,10 +7,10 @@ use super::leg::{Leg, Point};
 use super::scene::Surface;
 use super::suspects::{Suspect, Suspects};
 use super::{PointRow, Price, Pricer};
-use crate::cost::band::Excess;
+use crate::cost::band::{Excess, TerminalZone};
 use crate::cost::{Model, Section, Tolerance};
+use crate::geometry::Segment;
 use crate::geometry::lane::{Lane, Mask};
-use crate::geometry::{Point2, Segment};
 
 /// What a proof may overlook, as a share of what counts as a breach.
 const OVERLOOKED: f64 = 0.5;
@@ -18,10 +18,10 @@ const OVERLOOKED: f64 = 0.5;
 /// The heights that routes must keep, made ready for proofs.
 #[derive(Debug, Clone)]
 pub(super) struct Heights {
-    zones: Vec<Zone>,
+    zones: Vec<TerminalZone>,
     /// Lowest height above ground outside the terminal zones, less what may be overlooked.
     floor: f64,
-    /// Lowest height above ground in any of them, likewise.
+    /// What is high enough in all of them: the greatest of their floors, likewise.
     ground: f64,
     /// Highest height above ground anywhere, likewise.
     ceiling: f64,
@@ -29,12 +29,6 @@ pub(super) struct Heights {
     pub(super) overlooked: f64,
     /// The elevation below the start and below the target.
     pub(super) below_ends: [f64; 2],
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Zone {
-    center: Point2,
-    radius: f64,
 }
 
 /// Points of a section, as shares of it, at which a breach may be noticed.
@@ -67,20 +61,10 @@ impl Heights {
         let slack = OVERLOOKED * tolerance.height_m;
         let ends = [model.scenario.start, model.scenario.target];
         // An end that lies in the band has no zone to be measured by.
-        let wide: Vec<_> = model
-            .zones
-            .iter()
-            .filter(|zone| zone.radius > 0.0)
-            .collect();
-        let floors = wide.iter().map(|zone| zone.floor);
+        let wide = model.zones.iter().filter(|zone| zone.radius > 0.0);
+        let floors = wide.clone().map(|zone| zone.floor);
         Self {
-            zones: wide
-                .iter()
-                .map(|zone| Zone {
-                    center: zone.center,
-                    radius: zone.radius,
-                })
-                .collect(),
+            zones: wide.copied().collect(),
             floor: band.min - slack,
             ground: floors.fold(f64::NEG_INFINITY, f64::max) - slack,
             ceiling: band.max + slack,

@@ -57,7 +57,7 @@ impl Readers {
             let transaction = connection.transaction()?;
             let result = work(&transaction);
             drop(transaction);
-            readers.lock_idle().push(connection);
+            readers.idle.lock().push(connection);
             drop(permit);
             result
         });
@@ -69,11 +69,11 @@ impl Readers {
     pub(super) async fn close(&self) {
         let _every_permit = self.permits.acquire_many(CONNECTIONS).await;
         self.permits.close();
-        self.lock_idle().clear();
+        self.idle.lock().clear();
     }
 
     fn take(&self) -> Result<Connection, StoreError> {
-        let idle = self.lock_idle().pop();
+        let idle = self.idle.lock().pop();
         idle.map_or_else(|| self.open(), Ok)
     }
 
@@ -85,10 +85,6 @@ impl Readers {
         connection.busy_timeout(BUSY_TIMEOUT)?;
         connection.set_prepared_statement_cache_capacity(32);
         Ok(connection)
-    }
-
-    fn lock_idle(&self) -> parking_lot::MutexGuard<'_, Vec<Connection>> {
-        self.idle.lock()
     }
 }
 

@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 
 use crate::job::{Plan, PlanId};
 use crate::store::Stats;
@@ -31,27 +31,27 @@ struct Kept {
 impl Records {
     /// Take this before reading what is to be kept.
     pub(super) fn version(&self) -> Version {
-        Version(self.lock().version)
+        Version(self.0.lock().version)
     }
 
     /// The record, if it is known to be current: nothing has been committed since it was read, or it had ended and was
     /// not touched.
     pub(super) fn plan(&self, id: PlanId) -> Option<Plan> {
-        let kept = self.lock();
+        let kept = self.0.lock();
         let (version, plan) = kept.plans.get(&id)?;
         (*version == kept.version || plan.status.is_final()).then(|| plan.clone())
     }
 
     /// The counts, if nothing has been committed since they were read.
     pub(super) fn stats(&self) -> Option<Stats> {
-        let kept = self.lock();
+        let kept = self.0.lock();
         let (version, stats) = kept.stats?;
         (version == kept.version).then_some(stats)
     }
 
     /// Keep a record that was read after `version` was taken.
     pub(super) fn keep_plan(&self, version: Version, plan: &Plan) {
-        let mut kept = self.lock();
+        let mut kept = self.0.lock();
         if kept.still(version) {
             if kept.plans.len() >= CAPACITY {
                 kept.plans.clear();
@@ -62,7 +62,7 @@ impl Records {
 
     /// Keep counts that were read after `version` was taken.
     pub(super) fn keep_stats(&self, version: Version, stats: Stats) {
-        let mut kept = self.lock();
+        let mut kept = self.0.lock();
         if kept.still(version) {
             kept.stats = Some((version.0, stats));
         }
@@ -70,7 +70,7 @@ impl Records {
 
     /// A commit begins that changes or removes these plans, and may change the queue positions and counts of all.
     pub(super) fn begin(&self, changed: impl Iterator<Item = PlanId>) {
-        let mut kept = self.lock();
+        let mut kept = self.0.lock();
         kept.version += 1;
         for id in changed {
             kept.plans.remove(&id);
@@ -79,20 +79,16 @@ impl Records {
 
     /// The commit is done, or has failed.
     pub(super) fn end(&self) {
-        self.lock().version += 1;
+        self.0.lock().version += 1;
     }
 
     /// Drop everything and cache nothing from now on.
     pub(super) fn close(&self) {
-        let mut kept = self.lock();
+        let mut kept = self.0.lock();
         *kept = Kept {
             version: kept.version | 1,
             ..Kept::default()
         };
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Kept> {
-        self.0.lock()
     }
 }
 
@@ -167,6 +163,6 @@ mod tests {
         for id in 0..3 * CAPACITY as u128 {
             records.keep_plan(records.version(), &plan(id, Status::Failed));
         }
-        assert!(records.lock().plans.len() <= CAPACITY);
+        assert!(records.0.lock().plans.len() <= CAPACITY);
     }
 }

@@ -1,6 +1,8 @@
 //! A simple ring: exact distance along a leg, and the integral of its soft zone.
 //!
-//! Deliberately absent: which feature of the ring is nearest along a leg; see [`nearest`].
+//! The integral is found in three ways. Many legs at once, in lanes, are priced by the parts of the soft zone that belong
+//! to one feature alone ([`zones`]). A single leg is priced by the cells that were found once for the ring ([`cells`],
+//! [`exposure`]), and cut where its nearest feature changes ([`nearest`]) where too much reaches into a cell.
 
 mod cells;
 mod depth;
@@ -127,10 +129,12 @@ impl Polygon {
         if depth > 0.0 {
             return -depth;
         }
-        self.pieces(leg, window)
-            .iter()
-            .map(|piece| piece.least_distance(leg))
-            .fold(f64::INFINITY, f64::min)
+        let features = self.features(leg, window);
+        let (length, mut least) = (leg.horizontal_length(), f64::INFINITY);
+        cut(&features, window, length, &|_| true, &mut |piece| {
+            least = least.min(piece.least_distance(leg));
+        });
+        least
     }
 
     /// Integral of `T` over the part `window` of `leg`: `margin - distance` outside the ring up to
@@ -272,34 +276,6 @@ impl Polygon {
             Some(index) => index.distance(&self.vertices, point),
             None => ring::distance(&self.vertices, point),
         }
-    }
-
-    /// The part `window` of `leg`, cut into pieces in order where the nearest feature of the ring changes and where
-    /// the leg crosses the ring.
-    fn pieces(&self, leg: &Segment, window: (f64, f64)) -> Vec<Piece> {
-        let features = self.features(leg, window);
-        let mut pieces = Vec::new();
-        let length = leg.horizontal_length();
-        cut(&features, window, length, &|_| true, &mut |piece| {
-            pieces.push(piece);
-        });
-        if window.0 >= window.1 {
-            // A single point, for example of a leg that just reaches the base.
-            let inside = self.contains(leg.at(window.0).xy());
-            for piece in &mut pieces {
-                piece.inside = inside;
-            }
-            return pieces;
-        }
-        let crossings = nearest::crossings(&features, window);
-        let mut from = window.0;
-        for to in crossings.into_iter().chain([window.1]) {
-            if self.contains(leg.at(0.5 * (from + to)).xy()) {
-                nearest::mark_inside(&mut pieces, (from, to));
-            }
-            from = to;
-        }
-        pieces
     }
 }
 

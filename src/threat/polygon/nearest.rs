@@ -41,8 +41,6 @@ pub(super) struct Piece {
     pub(super) t0: f64,
     pub(super) t1: f64,
     pub(super) nearest: Feature,
-    /// Whether this part of the leg lies inside the ring.
-    pub(super) inside: bool,
 }
 
 /// A vertex or an edge relative to a leg.
@@ -220,27 +218,6 @@ pub(super) fn crossings(features: &[Feature], window: (f64, f64)) -> Vec<f64> {
     crossings
 }
 
-/// Mark the part `(from, to)` of the leg as inside the ring.
-pub(super) fn mark_inside(pieces: &mut Vec<Piece>, (from, to): (f64, f64)) {
-    let mut cut_at = |t: f64| {
-        let within = |piece: &Piece| piece.t0 + SHORTEST_PIECE < t && t < piece.t1 - SHORTEST_PIECE;
-        if let Some(idx) = pieces.iter().position(within) {
-            let later = Piece {
-                t0: t,
-                ..pieces[idx]
-            };
-            pieces[idx].t1 = t;
-            pieces.insert(idx + 1, later);
-        }
-    };
-    cut_at(from);
-    cut_at(to);
-    for piece in pieces {
-        let middle = 0.5 * (piece.t0 + piece.t1);
-        piece.inside |= from < middle && middle < to;
-    }
-}
-
 /// The pieces of `window` of a leg of horizontal `length`, in order: the feature nearest to its middle is nearest on
 /// a part of it; the rest is cut recursively. Parts on which nothing is farther from the ring than a distance that is not
 /// `wanted` may be left out.
@@ -285,7 +262,6 @@ pub(super) fn cut(
             t0,
             t1,
             nearest: *nearest,
-            inside: false,
         });
     };
     match nearest.kind {

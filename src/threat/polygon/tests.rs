@@ -41,16 +41,46 @@ fn bay(margin: f64) -> Polygon {
     )
 }
 
-/// Exposure of a leg as the sum over its pieces, without cells.
-fn exposure_of_pieces(ring: &Polygon, leg: &Segment, window: (f64, f64)) -> f64 {
-    let of = |piece: &Piece| {
-        if piece.inside {
-            ring.margin * (piece.t1 - piece.t0) * leg.length()
+/// A part of a leg with one nearest feature, all inside the ring or all outside.
+struct Part {
+    piece: Piece,
+    inside: bool,
+}
+
+/// The part `window` of `leg`, cut in order where the nearest feature of the ring changes and where the leg crosses the
+/// ring.
+fn parts(ring: &Polygon, leg: &Segment, window: (f64, f64)) -> Vec<Part> {
+    let features = ring.features(leg, window);
+    let crossings = nearest::crossings(&features, window);
+    let (length, mut parts) = (leg.horizontal_length(), Vec::new());
+    cut(&features, window, length, &|_| true, &mut |piece| {
+        let within = crossings.iter().filter(|&&t| piece.t0 < t && t < piece.t1);
+        let ends = [
+            &[piece.t0][..],
+            &within.copied().collect::<Vec<_>>(),
+            &[piece.t1],
+        ]
+        .concat();
+        for ends in ends.windows(2) {
+            let [t0, t1] = [ends[0], ends[1]];
+            let inside = ring.contains(leg.at(0.5 * (t0 + t1)).xy());
+            let piece = Piece { t0, t1, ..piece };
+            parts.push(Part { piece, inside });
+        }
+    });
+    parts
+}
+
+/// Exposure of a leg as the sum over its parts, without cells.
+fn exposure_of_parts(ring: &Polygon, leg: &Segment, window: (f64, f64)) -> f64 {
+    let of = |part: &Part| {
+        if part.inside {
+            ring.margin * (part.piece.t1 - part.piece.t0) * leg.length()
         } else {
-            ring.piece_exposure(leg, piece)
+            ring.piece_exposure(leg, &part.piece)
         }
     };
-    ring.pieces(leg, window).iter().map(of).sum()
+    parts(ring, leg, window).iter().map(of).sum()
 }
 
 #[test]
@@ -330,8 +360,8 @@ proptest! {
         }
         for window in [(t0, t1), (0.0, 1.0), (t0, t0)] {
             let (depth, exposure) = ring.encounter(&leg, window);
-            let pieces = ring.pieces(&leg, window);
-            let within = || pieces.iter().filter(|piece| piece.inside);
+            let parts = parts(&ring, &leg, window);
+            let within = || parts.iter().filter(|part| part.inside).map(|part| part.piece);
             // Inside, distance is convex on each piece, so its maximum is at an end; for a leg from edge to edge of a
             // ring so sharp or so small that no piece ends between, it is at the middle.
             let at_ends = within().map(|piece| piece.end_distances(&leg));
@@ -340,7 +370,7 @@ proptest! {
                 let middles = within().map(|piece| leg.at(0.5 * (piece.t0 + piece.t1)).xy());
                 deepest = middles.map(|point| ring.ring_distance(point)).fold(0.0, f64::max);
             }
-            let sum = exposure_of_pieces(&ring, &leg, window);
+            let sum = exposure_of_parts(&ring, &leg, window);
             // Along an edge, pieces tell the sides apart to a fraction of the leg.
             prop_assert!((depth - deepest).abs() < 1e-6, "{depth} {deepest}");
             prop_assert!((exposure - sum).abs() <= 1e-8 * (1.0 + sum), "{exposure} {sum}");
@@ -351,7 +381,8 @@ proptest! {
     fn pieces_cover_the_window_in_order(
         a in prop::array::uniform3(-30.0..30.0f64), b in prop::array::uniform3(-30.0..30.0f64),
     ) {
-        let pieces = star().pieces(&leg(a, b), (0.1, 0.9));
+        let parts = parts(&star(), &leg(a, b), (0.1, 0.9));
+        let pieces: Vec<Piece> = parts.into_iter().map(|part| part.piece).collect();
         prop_assert!((pieces[0].t0 - 0.1).abs() < 1e-9);
         prop_assert!((pieces[pieces.len() - 1].t1 - 0.9).abs() < 1e-9);
         for pair in pieces.windows(2) {

@@ -1,4 +1,4 @@
-//! Parts of a ring's soft zone that belong to a single edge or corner.
+//! Parts of a ring's soft zone that belong to a single edge or corner, for pricing in lanes.
 //!
 //! There the distance from the ring is the distance from that feature, so exposure is a sum over features. This does
 //! not hold near a reflex corner or where a part of the ring is close to another.

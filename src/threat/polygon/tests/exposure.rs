@@ -97,7 +97,7 @@ fn vertices_that_are_nearly_straight_or_doubled_are_exposed_once() {
     );
     let away = leg([1.6, -0.2, 0.0], [9.1, -2.7, 0.0]);
     let exposure = subdivided.exposure(&away, (0.0, 1.0));
-    let sum = exposure_of_pieces(&subdivided, &away, (0.0, 1.0));
+    let sum = exposure_of_parts(&subdivided, &away, (0.0, 1.0));
     assert!((exposure - sum).abs() < 1e-8, "{exposure} {sum}");
     for gap in [1e-13, 5e-13, 5e-12, 5e-11, 5e-10, 5e-9, 1e-7] {
         let doubled = ring(
@@ -185,7 +185,7 @@ proptest! {
         };
         let ring = Polygon::new(corners.iter().enumerate().map(corner).collect(), margin);
         let leg = leg(a, b);
-        let sum = exposure_of_pieces(&ring, &leg, (0.0, 1.0));
+        let sum = exposure_of_parts(&ring, &leg, (0.0, 1.0));
         let exposure = ring.exposure(&leg, (0.0, 1.0));
         prop_assert!((exposure - sum).abs() <= 1e-8 * (1.0 + sum), "{exposure} {sum}");
     }

@@ -25,7 +25,7 @@ pub(super) trait Uploads: Debug + Send + Sync {
     fn find(&self, name: &str, sha256: Option<&str>) -> Result<Found, DatasetError>;
     fn entry(&self, name: &str) -> Result<Entry, CatalogueError>;
     fn stage(&self, limit: u64) -> Result<Staged, CatalogueError>;
-    fn permit(&self, naming: &Naming) -> Result<(), CatalogueError>;
+    fn permit(&self, naming: &Naming, room: Room) -> Result<(), CatalogueError>;
     /// With the record that the name has now.
     fn keep(
         &self,
@@ -182,9 +182,9 @@ impl Catalogue for Directories {
         self.uploaded()?.stage(limit)
     }
 
-    fn permit(&self, naming: &Naming) -> Result<(), CatalogueError> {
+    fn permit(&self, naming: &Naming, room: Room) -> Result<(), CatalogueError> {
         self.check_not_mounted(&naming.name)?;
-        self.uploaded()?.permit(naming)
+        self.uploaded()?.permit(naming, room)
     }
 
     fn keep(

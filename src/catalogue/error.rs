@@ -55,7 +55,7 @@ pub enum CatalogueError {
         room: u64,
     },
     /// There are as many uploads as there may be.
-    #[error("there are {most} uploads already")]
+    #[error("there are as many uploads as may be, {most}")]
     TooMany {
         /// The greatest number allowed.
         most: usize,

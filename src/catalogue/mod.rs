@@ -67,7 +67,7 @@ pub trait Catalogue: Datasets {
     ///
     /// # Errors
     /// As [`Catalogue::keep`].
-    fn permit(&self, naming: &Naming) -> Result<(), CatalogueError>;
+    fn permit(&self, naming: &Naming, room: Room) -> Result<(), CatalogueError>;
 
     /// Keep a received file under a name, durably and atomically, where all uploads together need no more than `room`
     /// with it. Uploads that end at the same moment on several nodes may exceed it. Also returns what is known about

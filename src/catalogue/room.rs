@@ -1,19 +1,22 @@
-//! What all uploads together may take.
+//! Whether one more upload finds room.
+
+use std::collections::BTreeMap;
 
 use super::CatalogueError;
-use super::records::Content;
+use super::records::{Content, Name};
 
 /// What all uploads together may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Room {
     /// Length of their files, bytes.
     pub bytes: u64,
-    /// Number of names, and of files: the smallest file takes a few blocks of a disk.
+    /// Number of names. There may be twice as many files, since those of replaced and deleted datasets stay for a
+    /// while; the smallest takes a few blocks of a disk.
     pub datasets: usize,
 }
 
 impl Room {
-    /// For what is known already.
+    /// For what must not be refused.
     pub(super) const ENDLESS: Self = Self {
         bytes: u64::MAX,
         datasets: usize::MAX,
@@ -25,7 +28,7 @@ impl Room {
         contents: impl ExactSizeIterator<Item = &'a Content>,
         more: u64,
     ) -> Result<(), CatalogueError> {
-        self.admit_one(contents.len())?;
+        self.admit_one(contents.len(), self.datasets.saturating_mul(2))?;
         let bytes = contents.map(|content| content.bytes).sum::<u64>();
         if bytes.saturating_add(more) > self.bytes {
             return Err(CatalogueError::Full { room: self.bytes });
@@ -33,9 +36,20 @@ impl Room {
         Ok(())
     }
 
-    /// Fails unless there may be one more than so many.
-    pub(super) fn admit_one(self, known: usize) -> Result<(), CatalogueError> {
-        if known >= self.datasets {
+    /// Fails where this name is one more than there may be.
+    pub(super) fn admit_name(
+        self,
+        names: &BTreeMap<String, Name>,
+        name: &str,
+    ) -> Result<(), CatalogueError> {
+        if names.contains_key(name) {
+            return Ok(());
+        }
+        self.admit_one(names.len(), self.datasets)
+    }
+
+    fn admit_one(self, known: usize, most: usize) -> Result<(), CatalogueError> {
+        if known >= most {
             return Err(CatalogueError::TooMany {
                 most: self.datasets,
             });

@@ -216,8 +216,10 @@ impl Uploads for Uploaded {
         })
     }
 
-    fn permit(&self, naming: &Naming) -> Result<(), CatalogueError> {
-        Name::permit(self.state.lock().names.get(&naming.name), naming)
+    fn permit(&self, naming: &Naming, room: Room) -> Result<(), CatalogueError> {
+        let names = &self.state.lock().names;
+        Name::permit(names.get(&naming.name), naming)?;
+        room.admit_name(names, &naming.name)
     }
 
     fn keep(
@@ -230,9 +232,7 @@ impl Uploads for Uploaded {
         let mut state = self.state.lock();
         let before = state.names.get(&name).cloned();
         Name::permit(before.as_ref(), naming)?;
-        if before.is_none() {
-            room.admit_one(state.names.len())?;
-        }
+        room.admit_name(&state.names, &name)?;
         self.keep_content(&mut state, file, room)?;
         let (kept, record) = Name::assigned(before.as_ref(), file, naming);
         if kept == Kept::Unchanged {

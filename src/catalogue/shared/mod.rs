@@ -163,8 +163,10 @@ impl Uploads for Shared {
         self.cache.stage(limit)
     }
 
-    fn permit(&self, naming: &Naming) -> Result<(), CatalogueError> {
-        Name::permit(self.view()?.names.get(&naming.name), naming)
+    fn permit(&self, naming: &Naming, room: Room) -> Result<(), CatalogueError> {
+        let names = &self.view()?.names;
+        Name::permit(names.get(&naming.name), naming)?;
+        room.admit_name(names, &naming.name)
     }
 
     fn keep(
@@ -174,16 +176,14 @@ impl Uploads for Shared {
         room: Room,
     ) -> Result<(Kept, Name), CatalogueError> {
         // Before sending bytes in vain.
-        self.permit(naming)?;
+        self.permit(naming, room)?;
         self.shelve(file, room)?;
         let key = name_key(&naming.name);
         let kept = loop {
             let view = self.view()?;
             let before = view.names.get(&naming.name);
             Name::permit(before, naming)?;
-            if before.is_none() {
-                room.admit_one(view.names.len())?;
-            }
+            room.admit_name(&view.names, &naming.name)?;
             let (kept, record) = Name::assigned(before, file, naming);
             let is_so =
                 kept == Kept::Unchanged || self.write(&key, &record, view.written(&key))?.is_some();

@@ -93,7 +93,7 @@ impl Problem {
                 format!("with this dataset, all uploaded ones would be longer than {room} bytes, the limit terrains_bytes of GET /limits; delete some first")
             }
             Self::TooManyTerrains(most) => {
-                format!("there are {most} uploaded datasets, with replaced ones that are still kept, as many as the limit terrains of GET /limits allows; delete some first")
+                format!("there are as many datasets as may be, or more replaced and deleted ones than that are still kept: {most}, the limit terrains of GET /limits; delete some first")
             }
             Self::UploadStalled(limit) => {
                 let limit = limit.as_secs_f64();

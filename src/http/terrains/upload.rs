@@ -31,7 +31,7 @@ pub(in crate::http) async fn put(
     let said = Said::read(&name, &uri)?;
     let naming = naming(&state, name, &caller, &headers);
     // Checked first, so that no long body is sent in vain.
-    permit(&state.terrains, naming.clone()).await?;
+    permit(&state, naming.clone()).await?;
     let (staged, place) = receive(&state, &caller, &headers, body).await?;
     let checked = check(&state.terrains, &caller, staged, said).await?;
     let (kept, entry) = keep(&state, &place, checked, naming).await?;
@@ -75,10 +75,20 @@ fn read_format(name: &str) -> Result<Format, Problem> {
     format.ok_or_else(|| params::refused("format", name, &format!("one of {}", names())))
 }
 
-async fn permit(terrains: &Terrains, naming: Naming) -> Result<(), Problem> {
-    terrains
-        .ask(move |catalogue| catalogue.permit(&naming))
+async fn permit(state: &AppState, naming: Naming) -> Result<(), Problem> {
+    let room = room(state);
+    state
+        .terrains
+        .ask(move |catalogue| catalogue.permit(&naming, room))
         .await
+}
+
+fn room(state: &AppState) -> Room {
+    let limits = state.rules.limits;
+    Room {
+        bytes: limits.terrains_bytes,
+        datasets: limits.terrains,
+    }
 }
 
 /// Read the file through. There are few uploads, so each waits for its turn however long that takes.
@@ -101,11 +111,7 @@ async fn keep(
     naming: Naming,
 ) -> Result<(Kept, Entry), Problem> {
     let sha256 = checked.sha256().to_owned();
-    let limits = state.rules.limits;
-    let room = Room {
-        bytes: limits.terrains_bytes,
-        datasets: limits.terrains,
-    };
+    let room = room(state);
     // What was deleted a moment ago must not take room.
     if let Err(error) = sweep_datasets(&*state.store, &state.terrains.catalogue).await {
         tracing::debug!(%error, "datasets were not swept before an upload");

@@ -469,9 +469,11 @@ async fn datasets_beyond_their_number_are_refused_and_leave_nothing() {
         let refused = put(&api, "/terrains/third", file.clone()).await;
         let problem = refused.expect_problem(413, "terrains-full");
         let detail = problem["detail"].as_str().expect("text");
-        assert!(detail.contains("2 uploaded datasets"), "{detail}");
+        assert!(detail.contains("2, the limit terrains of"), "{detail}");
         assert_eq!(kept(&api.uploads()), [4, 2, 0]);
     }
+    let answer = put(&api, "/terrains/second", hill(300.0)).await;
+    assert_eq!(answer.status, 200, "it may be replaced: {answer:?}");
     assert_eq!(api.delete("/terrains/second").await.status, 204);
     let answer = put(&api, "/terrains/third", second).await;
     assert_eq!(answer.status, 201, "{answer:?}");

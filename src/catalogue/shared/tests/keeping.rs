@@ -37,15 +37,21 @@ fn nodes_share_the_number_of_names() {
         datasets: 1,
         ..Room::ENDLESS
     };
-    let checked = a.checked(100);
-    let keep = |node: &Node, name| node.shared.keep(&checked, &naming(name), room);
-    assert_eq!(keep(&a, "hill").expect("room for one").0, Kept::Created);
-    for name in ["other", "third"] {
-        let kept = keep(&b, name);
+    let keep = |node: &Node, name, height| {
+        let kept = node.shared.keep(&node.checked(height), &naming(name), room);
+        kept.map(|(kept, _)| kept)
+    };
+    assert_eq!(keep(&a, "hill", 100).expect("room for one"), Kept::Created);
+    for height in [100, 250] {
+        let kept = keep(&b, "other", height);
         assert!(matches!(kept, Err(CatalogueError::TooMany { most: 1 })));
     }
-    assert_eq!(keep(&b, "hill").expect("it is there").0, Kept::Unchanged);
+    assert_eq!(keep(&b, "hill", 300).expect("it is there"), Kept::Replaced);
     assert_eq!(a.shared.tally().datasets, 1);
+    // Nothing was sent in vain, and there may be as many more files.
+    assert_eq!(a.shared.view().expect("it is read").contents.len(), 2);
+    let kept = keep(&a, "hill", 50);
+    assert!(matches!(kept, Err(CatalogueError::TooMany { most: 1 })));
 }
 
 #[test]

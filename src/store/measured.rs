@@ -168,6 +168,11 @@ impl Store for MeasuredStore {
         self.measured("datasets_in_use", uses).await
     }
 
+    async fn all_datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError> {
+        let uses = self.store.all_datasets_in_use();
+        self.measured("datasets_in_use", uses).await
+    }
+
     async fn stats(&self) -> Result<Stats, StoreError> {
         self.measured("stats", self.store.stats()).await
     }

@@ -211,6 +211,11 @@ pub trait Store: Send + Sync + 'static {
     /// The datasets that plans of any owner use, in the order of their sums.
     async fn datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError>;
 
+    /// The same, but an error unless all plans are known: what none of them uses may be removed.
+    async fn all_datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError> {
+        self.datasets_in_use().await
+    }
+
     /// Counts for the queue's head-room and `Retry-After`.
     async fn stats(&self) -> Result<Stats, StoreError>;
 

@@ -305,6 +305,11 @@ impl Store for Reopening {
         self.heed(&store, store.datasets_in_use().await)
     }
 
+    async fn all_datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.all_datasets_in_use().await)
+    }
+
     async fn stats(&self) -> Result<Stats, StoreError> {
         let store = self.store()?;
         self.heed(&store, store.stats().await)

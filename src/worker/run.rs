@@ -82,17 +82,14 @@ impl Slot {
         let run = run
             .await
             .expect("the planning thread answers even when it panics");
-        let (rest, lacks_events) = match rest {
-            Ok(rest) => (rest, false),
-            Err(Unstored::GivenUp) => (Vec::new(), true),
+        let rest = match rest {
+            Ok(rest) => rest,
+            Err(Unstored::GivenUp) => Vec::new(),
             // Nothing is left to conclude.
             Err(Unstored::Lost) => return None,
         };
         let run = match run {
-            // Its events would have a hole.
-            Run::Ended(Ending::Result { .. }) if lacks_events || stop.is_abandoned() => {
-                Run::Stopped
-            }
+            Run::Ended(Ending::Result { .. }) if stop.is_abandoned() => Run::Stopped,
             run => run,
         };
         Some(Over {

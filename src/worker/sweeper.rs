@@ -81,7 +81,7 @@ pub async fn sweep_datasets(
     if !tokio::task::spawn_blocking(move || asked.has_unnamed()).await? {
         return Ok(());
     }
-    let uses = store.datasets_in_use().await?;
+    let uses = store.all_datasets_in_use().await?;
     let used: BTreeSet<String> = uses.into_iter().map(|used| used.sha256).collect();
     let asked = catalogue.clone();
     tokio::task::spawn_blocking(move || asked.sweep(&used)).await??;

@@ -321,9 +321,13 @@ impl Store for JetStreamStore {
     }
 
     async fn datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError> {
-        // What the servers have said since might name others.
-        self.check_current()?;
         Ok(self.open_store()?.view.known().datasets())
+    }
+
+    async fn all_datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError> {
+        let uses = self.datasets_in_use().await?;
+        self.check_current()?;
+        Ok(uses)
     }
 
     async fn stats(&self) -> Result<Stats, StoreError> {

@@ -142,8 +142,10 @@ impl JetStream {
         // A wrong clock would remove what all nodes have; what is beyond the limits may go whatever the time.
         let expiry_ms = self.expiry_ms_at(now_ms);
         let expired = self.view.known().expired_tombstones(expiry_ms, SWEEP);
+        let mut forgotten = Ok(());
         for id in expired {
-            self.forget_tombstone(id).await?;
+            // One that cannot be forgotten does not keep the others.
+            forgotten = forgotten.and(self.forget_tombstone(id).await);
         }
         let removed = self.remove_expired(expiry_ms, now_ms).await?;
         if let Err(error) = self.restore_jobs(now_ms).await {
@@ -152,7 +154,7 @@ impl JetStream {
         if let Err(error) = self.discard_strays(now_ms).await {
             tracing::debug!(%error, "jobs without plans were not looked for; trying again");
         }
-        Ok(removed)
+        forgotten.map(|()| removed)
     }
 
     /// Remove plans that nobody has removed yet, as many as a sweep may. Other nodes remove the same plans meanwhile;

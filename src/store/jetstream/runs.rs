@@ -237,13 +237,13 @@ impl JetStream {
         revision: Option<u64>,
         now_ms: i64,
     ) -> Result<Plan, StoreError> {
-        let clock_ms = (self.options.clock)();
+        let expiry_ms = self.expiry_ms();
         let mut waited = None;
         let standing = self
             .plans()
             .change(id, |standing| {
                 waited = None;
-                let mut record = Box::new(standing.record(id, clock_ms)?.clone());
+                let mut record = Box::new(standing.record(id, expiry_ms)?.clone());
                 expected(&record.plan, revision)?;
                 match record.plan.status {
                     Status::Queued => {
@@ -264,7 +264,7 @@ impl JetStream {
         if let Some(place) = waited {
             self.withdraw(id, place).await;
         }
-        Ok(standing.record(id, clock_ms)?.plan.clone())
+        Ok(standing.record(id, expiry_ms)?.plan.clone())
     }
 }
 

@@ -151,38 +151,40 @@ impl JetStream {
             self.servers.write(&scenario, &submission.scenario),
             self.enqueue(id, lane, &mark)
         );
+        let objects = [scenario.key.clone()];
         let place = match (document, job) {
-            (Ok(()), Ok(place)) => Ok(place),
-            (Err(error), Ok(place)) => {
-                self.withdraw(id, place).await;
-                Err(error)
+            (Ok(()), Ok(place)) => place,
+            (Err(error), job) => {
+                self.undo(id, &objects, job.ok()).await;
+                return Err(NotAccepted::certainly(error));
             }
-            (Err(error), Err(_)) | (Ok(()), Err(error)) => Err(error),
-        };
-        let place = match place {
-            Ok(place) => place,
-            Err(error) => {
-                // If this fails too, what remains of it is removed with its job.
-                let _ = self.servers.remove_documents(id, &[scenario.key]).await;
+            (Ok(()), Err(error)) => {
+                self.undo(id, &objects, None).await;
                 return Err(NotAccepted::certainly(error));
             }
         };
-        let objects = [scenario.key.clone()];
         let record = Record::accepted(submission, Queued { place, position }, scenario);
         let plan = record.plan.clone();
         let change = Change::announced(Box::new(record));
         match self.plans().begin(id, change).await {
             Ok(()) => Ok(plan),
             Err(error) if lacks_room(&error) => {
-                // What was written before it must not take up the room that smaller plans and the ends of runs need.
-                self.withdraw(id, place).await;
-                let _ = self.servers.remove_documents(id, &objects).await;
+                self.undo(id, &objects, Some(place)).await;
                 Err(NotAccepted::certainly(error))
             }
             Err(error) => Err(NotAccepted {
                 is_certain: !matches!(error, StoreError::Unavailable { .. }),
                 error,
             }),
+        }
+    }
+
+    /// Remove what was written of a plan that is refused: it must not take up the room that smaller plans and the ends of
+    /// runs need. The job goes last, since what is left is found by it.
+    async fn undo(&self, id: PlanId, objects: &[String], place: Option<u64>) {
+        let removed = self.servers.remove_documents(id, objects).await;
+        if let (Ok(()), Some(place)) = (removed, place) {
+            self.withdraw(id, place).await;
         }
     }
 

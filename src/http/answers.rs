@@ -93,15 +93,15 @@ impl Answers {
         self.place(bytes, None).ok_or(busy)
     }
 
-    /// Room for one answer of so many bytes that is compressed as it is sent; `None` where it has to be sent plain.
-    pub(super) fn room_to_compress(&self, bytes: u64) -> Option<Place> {
-        let one = || self.0.compressors.clone().try_acquire_owned().ok();
+    /// Room for one answer of so many bytes, of which it occupies `own`, that is compressed as it is sent; `None` where it
+    /// has to be sent plain.
+    pub(super) fn room_to_compress(&self, bytes: u64, own: u64) -> Option<Place> {
         let compressor = if bytes > LONG {
-            Some(self.0.or_without_the_unread(one)?)
+            Some(self.0.compressor()?)
         } else {
             None
         };
-        self.place(bytes + COMPRESSOR, compressor)
+        self.place(own + COMPRESSOR, compressor)
     }
 
     /// Room for so many bytes out of the store that wait until an answer can be made of them; `None` if these are few,
@@ -129,8 +129,8 @@ pub(super) struct Place {
 
 /// What one answer has of the room.
 #[derive(Debug)]
-#[expect(dead_code, reason = "held")]
 struct Share {
+    #[expect(dead_code, reason = "held")]
     bytes: OwnedSemaphorePermit,
     compressor: Option<OwnedSemaphorePermit>,
 }
@@ -165,21 +165,32 @@ impl Room {
     fn take(&self, bytes: u64) -> Option<OwnedSemaphorePermit> {
         let bytes = self.bytes.min(usize::try_from(bytes).ok()?);
         let bytes = u32::try_from(bytes).ok()?;
-        self.or_without_the_unread(|| self.free.clone().try_acquire_many_owned(bytes).ok())
-    }
-
-    /// What is asked for, now or once those who do not read have made room.
-    fn or_without_the_unread<T>(&self, ask: impl Fn() -> Option<T>) -> Option<T> {
-        ask().or_else(|| {
-            self.let_go_of_the_unread();
-            ask()
+        let share = || self.free.clone().try_acquire_many_owned(bytes).ok();
+        share().or_else(|| {
+            self.let_go_of_the_unread(|_| true);
+            share()
         })
     }
 
-    fn let_go_of_the_unread(&self) {
+    /// A compressor, if one is free or if those who do not read what is compressed make it free.
+    fn compressor(&self) -> Option<OwnedSemaphorePermit> {
+        let one = || self.compressors.clone().try_acquire_owned().ok();
+        one().or_else(|| {
+            self.let_go_of_the_unread(|share| share.compressor.is_some());
+            one()
+        })
+    }
+
+    /// Let go of those of the answers with such shares that nobody takes.
+    fn let_go_of_the_unread(&self, such: impl Fn(&Share) -> bool) {
         let now = Instant::now();
         for rest in self.waiting.lock().answers.values() {
-            rest.lock().let_go_if_unread(now, self.patience);
+            // One that is locked is being read.
+            if let Some(mut rest) = rest.try_lock()
+                && rest.share.as_ref().is_some_and(&such)
+            {
+                rest.let_go_if_unread(now, self.patience);
+            }
         }
     }
 }

@@ -72,17 +72,18 @@ pub(super) fn send(
         *answer.status_mut() = plain.status;
     }
     let length = plain.and_then(|plain| plain.length).unwrap_or(0);
+    let own = if is_constant(&answer) { 0 } else { length };
     if coded && plain.is_none_or(|plain| !plain.coded) {
-        if let Some(place) = answers.room_to_compress(length) {
+        if let Some(place) = answers.room_to_compress(length, own) {
             return answer.map(|body| place.hold(body));
         }
         answer.headers_mut().remove(header::CONTENT_ENCODING);
     }
     let answer = answer.map(CompressionBody::into_inner);
-    if length <= PIECE as u64 || is_constant(&answer) {
+    if own <= PIECE as u64 {
         return answer;
     }
-    match answers.room(length) {
+    match answers.room(own) {
         Ok(place) => answer.map(|body| place.hold(body)),
         Err(busy) => busy.into_response(),
     }

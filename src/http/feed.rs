@@ -64,6 +64,9 @@ pub(super) struct Feed {
     last_sent: Instant,
     /// Whether the reader has been given everything that the store had when last read.
     caught_up: bool,
+    /// Events to ask the store for: fewer where not all of them could be given out, since long ones would be read again
+    /// and again.
+    page: usize,
     /// Events that may still be read once the service stops.
     last_events: usize,
     over: bool,
@@ -89,6 +92,7 @@ impl Feed {
             held_since: None,
             last_sent: Instant::now(),
             caught_up: false,
+            page: PAGE,
             last_events: LAST_EVENTS,
             over: false,
         }
@@ -106,55 +110,61 @@ impl Feed {
     }
 
     async fn wait_for_next(&mut self) -> Option<News> {
-        let mut out = Vec::new();
         while !self.over {
             // Read before the store: what is stored by then will still be read.
             let stopping = *self.phase.borrow() == Phase::Stopping;
             self.changes.mark_unchanged();
-            let page = match self.store.events(self.id, self.after, PAGE).await {
-                Ok(page) => page,
-                Err(error) => return self.broken(error),
+            let events = match self.read().await {
+                Ok(events) => events,
+                Err(instead) => return instead,
             };
-            if page.forgotten > self.after {
-                return self.skip(page.forgotten).await;
-            }
-            let mut events = page.events;
-            let quiet = events.is_empty();
-            self.caught_up = quiet;
-            let is_last_page = events.len() < PAGE;
-            if self.after == 0 && is_last_page {
-                self.show_place_in_queue(&mut events).await;
-            }
-            shorten(&mut events);
-            let count = events.len();
+            let (count, mut out) = (events.len(), Vec::new());
             self.take(events, &mut out);
-            if stopping && !self.over {
-                if quiet || self.last_events == 0 {
-                    // A reader who is further behind can read the rest from the next process.
-                    self.over = true;
-                    return Some(News::Stopping(out));
-                }
-                self.last_events = self.last_events.saturating_sub(count);
+            if stopping && self.leaves_after(count) {
+                return Some(News::Stopping(out));
             }
             if !out.is_empty() {
                 return Some(News::Events(out));
             }
-            if !quiet {
-                continue;
-            }
-            match self.wait().await {
-                Woken::Changed | Woken::Stopping => {}
-                Woken::WindowClosed => {
-                    self.throttle.release(&mut out);
-                    self.held_since = None;
-                    return Some(News::Events(out));
-                }
-                Woken::Silence => return Some(News::Silence),
-                Woken::Closed => break,
+            if count == 0
+                && let Some(news) = self.wait().await
+            {
+                return Some(news);
             }
         }
-        self.over = true;
         None
+    }
+
+    /// The next events, as many as may be given out at once, none if there are none yet; or what comes in their place.
+    async fn read(&mut self) -> Result<Vec<NumberedEvent>, Option<News>> {
+        let page = match self.store.events(self.id, self.after, self.page).await {
+            Ok(page) => page,
+            Err(error) => return Err(self.broken(error)),
+        };
+        if page.forgotten > self.after {
+            return Err(self.skip(page.forgotten).await);
+        }
+        let mut events = page.events;
+        self.caught_up = events.is_empty();
+        let read = events.len();
+        if self.after == 0 && read < self.page {
+            self.show_place_in_queue(&mut events).await;
+        }
+        shorten(&mut events);
+        let given = events.len();
+        self.page = if given < read { 2 * given } else { PAGE };
+        Ok(events)
+    }
+
+    /// Whether a reader who has just been given so many events leaves, now that the service stops: one that is further
+    /// behind can read the rest from the next process.
+    fn leaves_after(&mut self, count: usize) -> bool {
+        if self.over {
+            return false;
+        }
+        self.over = count == 0 || self.last_events == 0;
+        self.last_events = self.last_events.saturating_sub(count);
+        self.over
     }
 
     /// Continue after the events that the store has deleted. A new reader asked for none of them, and starts with the
@@ -167,7 +177,7 @@ impl Feed {
             return Some(News::Events(out));
         }
         let from = self.after + 1;
-        self.after = forgotten;
+        (self.after, self.caught_up) = (forgotten, false);
         if from > 1 {
             return Some(News::Gap {
                 from,
@@ -256,7 +266,25 @@ impl Feed {
         };
     }
 
-    async fn wait(&mut self) -> Woken {
+    /// Wait until there may be more to read, or for something to say meanwhile.
+    async fn wait(&mut self) -> Option<News> {
+        match self.wake().await {
+            Woken::Changed | Woken::Stopping => None,
+            Woken::WindowClosed => {
+                let mut out = Vec::new();
+                self.throttle.release(&mut out);
+                self.held_since = None;
+                Some(News::Events(out))
+            }
+            Woken::Silence => Some(News::Silence),
+            Woken::Closed => {
+                self.over = true;
+                None
+            }
+        }
+    }
+
+    async fn wake(&mut self) -> Woken {
         let window_closes = self
             .held_since
             .zip(self.throttle.window_ms())

@@ -21,7 +21,7 @@ pub(super) struct Heights {
     zones: Vec<TerminalZone>,
     /// Lowest height above ground outside the terminal zones, less what may be overlooked.
     floor: f64,
-    /// What is high enough in all of them: the greatest of their floors, likewise.
+    /// What is high enough in all terminal zones: the greatest of their floors, likewise.
     ground: f64,
     /// Highest height above ground anywhere, likewise.
     ceiling: f64,

@@ -71,11 +71,9 @@ async fn changed(
     wait: Wait,
     known: Option<&EntityTags>,
 ) -> Result<Plan, Problem> {
-    let is_news = |plan: &Plan| {
-        plan.status.is_final() || known.is_some_and(|known| !known.contain(&etag(plan)))
-    };
+    let awaited = known.map_or(Awaited::End, Awaited::Change);
     tokio::select! {
-        changed = wait_for(state, id, wait.duration(), is_news) => changed,
+        changed = wait_for(state, id, wait.duration(), awaited) => changed,
         () = state.access.withdrawn(caller.key, Scope::Read) => {
             Err(Problem::Unauthorized(Unauthorized::NoKey))
         }
@@ -134,12 +132,31 @@ pub(super) async fn delete(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// The plan once it is `enough`, or its current record when time runs out or the service stops.
+/// What a caller waits for.
+#[derive(Clone, Copy)]
+enum Awaited<'k> {
+    /// The plan's end.
+    End,
+    /// That, or another version of it than these.
+    Change(&'k EntityTags),
+}
+
+impl Awaited<'_> {
+    fn has_come(self, plan: &Plan) -> bool {
+        let is_news = match self {
+            Self::End => false,
+            Self::Change(known) => !known.contain(&etag(plan)),
+        };
+        is_news || plan.status.is_final()
+    }
+}
+
+/// The plan once what is awaited has come, or its current record when time runs out or the service stops.
 async fn wait_for(
     state: &AppState,
     id: PlanId,
     patience: Duration,
-    enough: impl Fn(&Plan) -> bool,
+    awaited: Awaited<'_>,
 ) -> Result<Plan, Problem> {
     let deadline = Instant::now() + patience;
     // Subscribed before the first look, so that no change is missed.
@@ -148,11 +165,11 @@ async fn wait_for(
     loop {
         changes.mark_unchanged();
         let plan = state.store.get(id).await?;
-        if enough(&plan) {
+        if awaited.has_come(&plan) {
             return Ok(plan);
         }
         // Its place changes with other plans, whose changes are not signalled here.
-        let moves = plan.status == Status::Queued;
+        let moves = plan.status == Status::Queued && matches!(awaited, Awaited::Change(_));
         tokio::select! {
             changed = changes.changed() => if changed.is_err() { return Ok(plan) },
             () = tokio::time::sleep_until(deadline) => return Ok(state.store.get(id).await?),

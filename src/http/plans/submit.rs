@@ -2,14 +2,15 @@
 
 use std::future::ready;
 
+use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
-use futures_util::future::{BoxFuture, Either};
+use futures_util::future::Either;
 
-use super::wait_for;
+use super::{Awaited, wait_for};
 use crate::digest::sha256_hex;
 use crate::http::auth::Scope;
 use crate::http::body::Announced;
@@ -38,11 +39,10 @@ pub(in crate::http) fn submit(
         Err(refusal) => return Either::Left(ready(Err(refusal))),
     };
     Either::Right(async move {
-        let draining = if asked.validate_only {
-            None
-        } else {
-            refusal_when_draining(&state).await?
-        };
+        if asked.validate_only {
+            return validated(&state, &caller, asked.announced, body).await;
+        }
+        let draining = refusal_when_draining(&state).await?;
         // A repeated request is answered all the same: it asks for no other plan.
         if asked.once.is_none()
             && let Some(refusal) = draining
@@ -58,20 +58,17 @@ pub(in crate::http) fn submit(
             Some(refusal) => Err(refusal),
             None => accept(&state, &caller, bytes).await,
         };
-        let submitting: BoxFuture<'_, _> = match read {
-            Ok(submission) if asked.validate_only => return Ok(valid(&submission)),
+        let Submitted { plan, replayed } = match read {
             Ok(submission) => {
                 let submission = Submission {
                     webhook: asked.webhook,
                     idempotency,
                     ..submission
                 };
-                Box::pin(hand_in(&state, asked.origin, submission))
+                Box::pin(hand_in(&state, asked.origin, submission)).await?
             }
-            Err(refusal) if asked.validate_only => return Err(refusal),
-            Err(refusal) => Box::pin(repeated(&state, &caller, idempotency, refusal)),
+            Err(refusal) => Box::pin(repeated(&state, &caller, idempotency, refusal)).await?,
         };
-        let Submitted { plan, replayed } = submitting.await?;
         drop(asked.once);
 
         let address = HeaderValue::from_str(&location(plan.id)).expect("an id is visible ASCII");
@@ -86,6 +83,17 @@ pub(in crate::http) fn submit(
         }
         Ok(answer)
     })
+}
+
+/// `?validate_only`: what would be accepted, and nothing is.
+async fn validated(
+    state: &AppState,
+    caller: &Caller,
+    announced: Announced,
+    body: Body,
+) -> Result<Response, Problem> {
+    let bytes = announced.read(caller, body).await?;
+    Ok(valid(&accept(state, caller, bytes).await?))
 }
 
 /// What a request specifies apart from its document.
@@ -203,14 +211,13 @@ async fn ended(
     plan: Plan,
     address: HeaderValue,
 ) -> Response {
-    let is_over = |plan: &Plan| plan.status.is_final();
     let waited = tokio::select! {
-        waited = wait_for(state, plan.id, wait.duration(), is_over) => waited.ok(),
+        waited = wait_for(state, plan.id, wait.duration(), Awaited::End) => waited.ok(),
         () = state.access.withdrawn(caller.key, Scope::Plan) => None,
     };
     // A plan on the disk was accepted, whatever the store reports afterwards.
     let plan = waited.unwrap_or(plan);
-    if !is_over(&plan) {
+    if !plan.status.is_final() {
         return accepted(plan, address);
     }
     let ended = [

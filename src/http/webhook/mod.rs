@@ -122,6 +122,7 @@ async fn deliver_all(delivery: Arc<Delivery>, mut end: watch::Receiver<bool>) {
                 continue;
             }
         }
+        // Asking which are due takes the longer the more there are, and none could be sent.
         if tasks.len() >= AT_ONCE {
             continue;
         }

@@ -51,6 +51,9 @@ pub(super) fn routes(
         let trees = [0, net.places.len() - 1].map(|end| net.cheapest(end));
         found.legs_priced += net.legs_priced;
         for chain in net::chains(model, &net.places, &trees, count) {
+            if is_over() {
+                break;
+            }
             let (route, legs_priced) = thin(model, &net.pricer, &chain);
             found.routes.push(route);
             found.legs_priced += legs_priced;

@@ -34,6 +34,9 @@ pub(super) fn routes(model: &Model, count: usize, is_over: &dyn Fn() -> bool) ->
         let mut net = Net::new(model, spots);
         if let Some(trees) = net.trees(is_over) {
             for chain in net.chains(model, &trees, count) {
+                if is_over() {
+                    break;
+                }
                 let (route, legs_priced) = thin(model, &net.legs.pricer, &chain);
                 found.routes.push(route);
                 found.legs_priced += legs_priced;

@@ -538,6 +538,28 @@ fn every_document_in_scenarios_is_accepted() {
     assert!(n_documents >= 5, "only {n_documents} documents were found");
 }
 
+/// A code that no document of these tests leads to would be missing from the manual, too.
+#[test]
+fn the_code_of_every_fault_is_in_the_table() {
+    let mut found = BTreeSet::new();
+    for entry in std::fs::read_dir("src/scenario/json").expect("the directory is there") {
+        let path = entry.expect("it can be listed").path();
+        let source = std::fs::read_to_string(&path).expect("it can be read");
+        for call in source.split(".add(").skip(1) {
+            // Right before the closure that tells the detail.
+            let before = call.split("||").next().unwrap_or_default().trim_end();
+            let code = before
+                .strip_suffix("\",")
+                .and_then(|before| before.rsplit('"').next());
+            found.extend(code.map(str::to_owned));
+        }
+    }
+    assert!(found.len() > 20, "{found:?}");
+    for code in found {
+        assert!(CODES.iter().any(|(known, _)| *known == code), "{code}");
+    }
+}
+
 #[test]
 fn the_fault_codes_are_distinct_and_well_formed() {
     let codes: BTreeSet<&str> = CODES.iter().map(|(code, _)| *code).collect();

@@ -5,15 +5,16 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use axum::body::Body;
-use axum::http::{Method, StatusCode};
-use noctule::http::Phase;
+use axum::http::{Method, Request, StatusCode};
+use noctule::http::{self, Answers, Phase};
 use noctule::job::Status;
 use noctule::store::{Options, Retention};
 use serde_json::{Value, json};
+use tower::ServiceExt as _;
 
 use crate::support::api::Api;
 use crate::support::faulty_store::FaultyStore;
-use crate::support::patience::eventually;
+use crate::support::patience::{PATIENCE, eventually};
 use crate::support::stores::for_every_backend;
 use crate::support::{run, scenario};
 
@@ -721,4 +722,25 @@ async fn a_partial_result_keeps_the_newest_points_of_a_long_convergence_curve() 
         assert!(iterations.eq((2_500..12_500).collect::<Vec<_>>().iter()));
     })
     .await;
+}
+
+/// They need no key, so that callers without one cannot use up the room of others' results.
+#[tokio::test]
+async fn parts_of_the_program_take_no_room_for_answers() {
+    let mut api = Api::new();
+    api.state.answers = Answers::new(1, PATIENCE);
+    let router = http::router(api.state.clone());
+    let mut unread = Vec::new();
+    for path in [
+        "/openapi.yaml",
+        "/openapi.json",
+        "/docs",
+        "/scenarios/jacksboro",
+    ] {
+        let request = Request::get(path).header("host", "localhost");
+        let request = request.body(Body::empty()).expect("a request");
+        let answer = router.clone().oneshot(request).await.expect("never fails");
+        assert_eq!(answer.status(), 200, "{path}");
+        unread.push(answer);
+    }
 }

@@ -1,9 +1,11 @@
 //! The stored records of names and contents, and the rules for changing a name.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::content::{Checked, Declaration};
-use super::{CatalogueError, Entry, Expected, Kept, Naming};
+use super::{CatalogueError, Entry, Expected, Kept, Naming, Room};
 use crate::terrain::dem::Survey;
 
 /// The stored record of a name.
@@ -16,7 +18,7 @@ pub(super) struct Name {
 
 impl Name {
     /// Whether a name that refers to `before` may be assigned to other content or removed.
-    pub(super) fn permit(before: Option<&Self>, naming: &Naming) -> Result<(), CatalogueError> {
+    fn permit(before: Option<&Self>, naming: &Naming) -> Result<(), CatalogueError> {
         let name = naming.name.clone();
         match (&naming.expected, before) {
             (Expected::Nothing, Some(_)) => return Err(CatalogueError::Exists { name }),
@@ -35,6 +37,20 @@ impl Name {
             return Err(CatalogueError::Owned { name });
         }
         Ok(())
+    }
+
+    /// What a name refers to that may be assigned to content, where there may be no more names than `room` has.
+    pub(super) fn assignable<'n>(
+        names: &'n BTreeMap<String, Self>,
+        naming: &Naming,
+        room: Room,
+    ) -> Result<Option<&'n Self>, CatalogueError> {
+        let before = names.get(&naming.name);
+        Self::permit(before, naming)?;
+        if before.is_none() {
+            room.admit_name(names.len())?;
+        }
+        Ok(before)
     }
 
     /// The result of assigning a name that refers to `before` to `file`, and its record then.

@@ -217,9 +217,7 @@ impl Uploads for Uploaded {
     }
 
     fn permit(&self, naming: &Naming, room: Room) -> Result<(), CatalogueError> {
-        let names = &self.state.lock().names;
-        Name::permit(names.get(&naming.name), naming)?;
-        room.admit_name(names, &naming.name)
+        Name::assignable(&self.state.lock().names, naming, room).map(drop)
     }
 
     fn keep(
@@ -230,9 +228,7 @@ impl Uploads for Uploaded {
     ) -> Result<(Kept, Name), CatalogueError> {
         let name = naming.name.clone();
         let mut state = self.state.lock();
-        let before = state.names.get(&name).cloned();
-        Name::permit(before.as_ref(), naming)?;
-        room.admit_name(&state.names, &name)?;
+        let before = Name::assignable(&state.names, naming, room)?.cloned();
         self.keep_content(&mut state, file, room)?;
         let (kept, record) = Name::assigned(before.as_ref(), file, naming);
         if kept == Kept::Unchanged {

@@ -164,9 +164,7 @@ impl Uploads for Shared {
     }
 
     fn permit(&self, naming: &Naming, room: Room) -> Result<(), CatalogueError> {
-        let names = &self.view()?.names;
-        Name::permit(names.get(&naming.name), naming)?;
-        room.admit_name(names, &naming.name)
+        Name::assignable(&self.view()?.names, naming, room).map(drop)
     }
 
     fn keep(
@@ -181,9 +179,7 @@ impl Uploads for Shared {
         let key = name_key(&naming.name);
         let kept = loop {
             let view = self.view()?;
-            let before = view.names.get(&naming.name);
-            Name::permit(before, naming)?;
-            room.admit_name(&view.names, &naming.name)?;
+            let before = Name::assignable(&view.names, naming, room)?;
             let (kept, record) = Name::assigned(before, file, naming);
             let is_so =
                 kept == Kept::Unchanged || self.write(&key, &record, view.written(&key))?.is_some();

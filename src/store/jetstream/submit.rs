@@ -152,14 +152,11 @@ impl JetStream {
             self.enqueue(id, lane, &mark)
         );
         let objects = [scenario.key.clone()];
-        let place = match (document, job) {
-            (Ok(()), Ok(place)) => place,
-            (Err(error), job) => {
-                self.undo(id, &objects, job.ok()).await;
-                return Err(NotAccepted::certainly(error));
-            }
-            (Ok(()), Err(error)) => {
-                self.undo(id, &objects, None).await;
+        let enqueued = job.as_ref().ok().copied();
+        let place = match document.and(job) {
+            Ok(place) => place,
+            Err(error) => {
+                self.undo(id, &objects, enqueued).await;
                 return Err(NotAccepted::certainly(error));
             }
         };

@@ -19,7 +19,7 @@ use crate::store::{LastEvent, Store, StoreError};
 const PAGE: usize = 128;
 
 /// About so many bytes of them are given out at once, or one event: whoever takes nothing holds this much memory.
-const PAGE_BYTES: usize = 64 * 1024;
+const PAGE_BYTES: usize = 32 * 1024;
 
 /// About so many events are read when the service stops, at most: enough for what the last runs report in their last
 /// moments, including their end, and no more, so that nobody holds up the exit.

@@ -10,7 +10,7 @@ use super::files::{self, Choice};
 use super::ground::Ground;
 use crate::digest::sha256_hex;
 use crate::export::{ExportError, ResultInput};
-use crate::scenario::json::{self, Rules};
+use crate::scenario::json::{self, Rules, Unread};
 use crate::scenario::limits::Limits;
 
 #[derive(Args)]
@@ -74,10 +74,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
 pub(super) fn code(error: &ExportError) -> u8 {
     match error {
         ExportError::Infeasible { .. } => exit::INFEASIBLE,
-        ExportError::Option(_) | ExportError::Unreachable(_) => exit::FAILED,
+        ExportError::Option(_) | ExportError::Unread(Unread::Unreachable(_)) => exit::FAILED,
         ExportError::NoGeodeticFrame { .. }
         | ExportError::Unflyable(_)
-        | ExportError::NoGround(_)
+        | ExportError::Unread(Unread::NoGround(_) | Unread::Damaged(_))
         | ExportError::Damaged(_) => exit::BAD_INPUT,
     }
 }

@@ -24,9 +24,9 @@ use super::{access, config, files};
 use crate::config::{Config, Flags};
 use crate::http::webhook::Sender;
 use crate::http::{self, Parts, Phase};
-use crate::job::{Failure, FailureKind};
+use crate::job::FailureKind;
 use crate::planner;
-use crate::scenario::json::{self, Refusal, Rules};
+use crate::scenario::json::{self, Rules, Unread};
 use crate::telemetry::{self, Instruments};
 use crate::worker::{self, Engine, Pool, Sweeper, Unplanned};
 
@@ -139,30 +139,21 @@ fn router(config: &Config, parts: Parts) -> Router {
 fn engine(rules: Arc<Rules>) -> Engine {
     let cores = available_parallelism().map_or(1, NonZero::get);
     Arc::new(move |document, observer, stop| {
-        let mut scenario =
-            json::read_accepted(document, &rules).map_err(|refusal| {
-                match refusal.unreachable_ground() {
-                    Some(fault) => Unplanned::NotNow(fault.detail.clone()),
-                    None => Unplanned::Failed(unread(&refusal)),
-                }
-            })?;
+        let mut scenario = json::read_accepted(document, &rules).map_err(unplanned)?;
         let threads = &mut scenario.planner.threads;
         *threads = (*threads).min(cores);
         Ok(planner::plan(&scenario, observer, stop))
     })
 }
 
-/// Why a document that was accepted can no longer be read.
-fn unread(refusal: &Refusal) -> Failure {
-    match refusal.lost_ground() {
-        Some(fault) => FailureKind::NoGround.because(format!(
-            "the ground that it was accepted over is gone: {}",
-            fault.detail
-        )),
-        None => FailureKind::InvalidScenario.because(format!(
-            "this version of the service cannot read the accepted document: {refusal}"
-        )),
-    }
+/// What becomes of a plan whose document cannot be read.
+fn unplanned(unread: Unread) -> Unplanned {
+    let kind = match unread {
+        Unread::Unreachable(error) => return Unplanned::NotNow(error),
+        Unread::NoGround(_) => FailureKind::NoGround,
+        Unread::Damaged(_) => FailureKind::InvalidScenario,
+    };
+    Unplanned::Failed(kind.because(unread.to_string()))
 }
 
 /// Plans that this node runs at a time.

@@ -33,18 +33,10 @@ impl Delivery {
     /// Parse both documents.
     ///
     /// # Errors
-    /// [`ExportError::Damaged`] when one cannot be read or its route has no extent, [`ExportError::NoGround`] when
-    /// the dataset no longer exists, [`ExportError::Unreachable`] when it is unreachable at present.
+    /// [`ExportError::Unread`] when the request cannot be read, [`ExportError::Damaged`] when the result cannot or its
+    /// route has no extent.
     pub(super) fn read(input: &ResultInput) -> Result<Self, ExportError> {
-        let scenario = json::read_accepted(input.scenario, input.rules).map_err(|refusal| {
-            if let Some(fault) = refusal.unreachable_ground() {
-                return ExportError::Unreachable(fault.detail.clone());
-            }
-            match refusal.lost_ground() {
-                Some(fault) => ExportError::NoGround(fault.detail.clone()),
-                None => ExportError::Damaged(format!("the scenario: {refusal}")),
-            }
-        })?;
+        let scenario = json::read_accepted(input.scenario, input.rules)?;
         let result: ResultDocument = serde_json::from_str(input.result)
             .map_err(|error| ExportError::Damaged(format!("the result: {error}")))?;
         let frame = &scenario.frame;

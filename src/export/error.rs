@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::ALL;
+use crate::scenario::json::Unread;
 
 /// Why a plan is not written in a format.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -30,13 +31,10 @@ pub enum ExportError {
     /// An option is unknown, not supported by the format, or has an invalid value.
     #[error(transparent)]
     Option(#[from] OptionFault),
-    /// The dataset used for planning no longer exists.
-    #[error("the ground that it was planned over is not there: {0}")]
-    NoGround(String),
-    /// The dataset is unreachable at present.
-    #[error("{0}")]
-    Unreachable(String),
-    /// The documents were not written by this program, or do not belong together.
+    /// The accepted document cannot be read.
+    #[error(transparent)]
+    Unread(#[from] Unread),
+    /// The result was not written by this program, or does not belong to the request.
     #[error("{0}")]
     Damaged(String),
 }

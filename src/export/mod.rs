@@ -198,8 +198,7 @@ impl Format {
     /// # Errors
     /// [`ExportError::NoGeodeticFrame`] and [`ExportError::Infeasible`] depending on the format;
     /// [`ExportError::Unflyable`] when no mission is possible with the options; [`ExportError::Option`] when they
-    /// contradict each other; [`ExportError::NoGround`] and [`ExportError::Unreachable`] when the dataset is gone or out
-    /// of reach; [`ExportError::Damaged`] when the documents were not written by this program or do not belong together.
+    /// contradict each other; [`ExportError::Unread`] and [`ExportError::Damaged`] when request or result cannot be read.
     pub fn write(&self, input: &ResultInput, options: &Options) -> Result<String, ExportError> {
         match self.write {
             Write::Stored => Ok(input.result.to_owned()),

@@ -11,6 +11,7 @@ use crate::digest::sha256_hex;
 use crate::geometry::Vector2;
 use crate::geometry::geodesy::{LatLon, undulation_m};
 use crate::planner;
+use crate::scenario::json::Unread;
 use crate::scenario::limits::Limits;
 use crate::scenario::{Frame, Scenario, json};
 use crate::seeding;
@@ -244,10 +245,14 @@ fn what_cannot_be_written_is_refused() {
         &[],
         "the result: in another frame than its scenario",
     );
-    let cut = (around.0[..200].to_owned(), around.1.clone());
+    let cut = |document: &str| document[..200].to_owned();
     assert!(matches!(
-        write(&cut, "gpx", &[]),
+        write(&(cut(&around.0), around.1.clone()), "gpx", &[]),
         Err(ExportError::Damaged(_))
+    ));
+    assert!(matches!(
+        write(&(around.0, cut(&around.1)), "gpx", &[]),
+        Err(ExportError::Unread(Unread::Damaged(_)))
     ));
 }
 

@@ -10,6 +10,7 @@ use super::problem::Problem;
 use super::{AppState, accept, partial, retry};
 use crate::export::{self, ExportError, Format, OPTIONS, Options, ResultInput, file_name};
 use crate::job::Plan;
+use crate::scenario::json::Unread;
 
 /// Parameters of a result beside the options of its format.
 const PARAMETERS: [&str; 2] = ["format", "partial"];
@@ -118,7 +119,7 @@ fn write_first(
                 error @ (ExportError::NoGeodeticFrame { .. }
                 | ExportError::Infeasible { .. }
                 | ExportError::Unflyable(_)
-                | ExportError::NoGround(_)),
+                | ExportError::Unread(Unread::NoGround(_))),
             ) => {
                 refusal.get_or_insert(error);
             }

@@ -77,16 +77,7 @@ fn measure(
     curve: Vec<Convergence>,
     origin: Origin,
 ) -> Result<String, Problem> {
-    let scenario = json::read_accepted(scenario, rules).map_err(|refusal| {
-        if let Some(fault) = refusal.unreachable_ground() {
-            return Problem::unreachable_datasets(&fault.detail);
-        }
-        if let Some(fault) = refusal.lost_ground() {
-            return Problem::NoGround(fault.detail.clone());
-        }
-        tracing::error!(%refusal, "an accepted document cannot be read");
-        Problem::Internal
-    })?;
+    let scenario = json::read_accepted(scenario, rules)?;
     let route = best.waypoints.into_iter();
     let route = route.map(|position| position.within(&scenario.frame));
     let route = route

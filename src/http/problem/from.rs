@@ -8,7 +8,7 @@ use crate::export::ExportError;
 use crate::http::auth::Scope;
 use crate::http::shown::Shown;
 use crate::import::ImportError;
-use crate::scenario::json::Refusal;
+use crate::scenario::json::{Refusal, Unread};
 use crate::store::{StoreError, Trouble};
 
 impl From<StoreError> for Problem {
@@ -75,6 +75,19 @@ impl From<Refusal> for Problem {
     }
 }
 
+impl From<Unread> for Problem {
+    fn from(unread: Unread) -> Self {
+        match unread {
+            Unread::Unreachable(error) => Self::unreachable_datasets(&error),
+            Unread::NoGround(_) => Self::NoGround(unread.to_string()),
+            Unread::Damaged(_) => {
+                tracing::error!(error = %unread, "a stored plan cannot be read");
+                Self::Internal
+            }
+        }
+    }
+}
+
 impl From<ExportError> for Problem {
     fn from(error: ExportError) -> Self {
         let detail = error.to_string();
@@ -86,10 +99,9 @@ impl From<ExportError> for Problem {
                 name: fault.name,
                 detail: fault.detail,
             },
-            ExportError::NoGround(_) => Self::NoGround(detail),
-            ExportError::Unreachable(error) => Self::unreachable_datasets(&error),
+            ExportError::Unread(unread) => unread.into(),
             ExportError::Damaged(_) => {
-                tracing::error!(%error, "a stored plan cannot be read");
+                tracing::error!(error = detail, "a stored plan cannot be read");
                 Self::Internal
             }
         }

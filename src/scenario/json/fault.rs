@@ -165,11 +165,8 @@ pub enum Refusal {
 }
 
 impl Refusal {
-    /// The fault of a dataset that is missing or unusable, if there is one. For a document that was accepted before,
-    /// the only other possible faults are a dataset that is unreachable at present, and what another version of this
-    /// program allowed.
-    #[must_use]
-    pub fn lost_ground(&self) -> Option<&Fault> {
+    /// The fault of a dataset that is missing or unusable, if there is one.
+    pub(super) fn lost_ground(&self) -> Option<&Fault> {
         self.fault_of(&["unknown-dataset", "replaced-dataset", "unreadable-dataset"])
     }
 

@@ -23,6 +23,7 @@ mod sketch;
 mod terrain;
 mod threats;
 mod tree;
+mod unread;
 mod value;
 mod vehicle;
 mod writer;
@@ -30,6 +31,7 @@ mod writer;
 pub use fault::{CODES, Fault, MAX_LISTED, MORE_FAULTS, Refusal};
 pub use parameters::{COMMON, CommonParameter, Takes};
 pub use ranges::MOST_M;
+pub use unread::Unread;
 
 use std::sync::Arc;
 
@@ -106,14 +108,14 @@ pub fn read(text: &[u8], rules: &Rules, drawn_seed: u64) -> Result<Scenario, Ref
 /// not invalidate an accepted document.
 ///
 /// # Errors
-/// As [`read`], but only if the document comes from another version of this program or a dataset is not available.
-pub fn read_accepted(document: &str, rules: &Rules) -> Result<Scenario, Refusal> {
+/// If a dataset is not available, or the document comes from another version of this program.
+pub fn read_accepted(document: &str, rules: &Rules) -> Result<Scenario, Unread> {
     let rules = Rules {
         limits: Limits::NONE,
         ..rules.clone()
     };
     // The document has a seed, so none is drawn.
-    read(document.as_bytes(), &rules, 0)
+    Ok(read(document.as_bytes(), &rules, 0)?)
 }
 
 /// Write the accepted document, defaults filled in, as one line of JSON. Reading it again gives an equal scenario;

@@ -320,7 +320,7 @@ impl Node {
         let rules = self.api.state.rules.clone();
         let engine: Engine = Arc::new(move |document, observer, stop| {
             let scenario = json::read_accepted(document, &rules);
-            let away = |refusal: json::Refusal| Unplanned::NotNow(refusal.to_string());
+            let away = |unread: json::Unread| Unplanned::NotNow(unread.to_string());
             Ok(planner::plan(&scenario.map_err(away)?, observer, stop))
         });
         let settings = worker::Settings {

@@ -109,6 +109,12 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
     } else {
         beside::bounded(scenario, stop, || search(&model, &mut log))
     };
+    let reason = match reason {
+        StopReason::Iterations => search_on(&model, lower, &mut log),
+        ended => ended,
+    };
+    // Only now: the searches after the last iteration are one point of the curve together.
+    log.last_point();
     // What follows the last iteration is cut short by a stop as well, and the outcome is another then.
     let cut_short = why_stop(scenario, stop).filter(|_| reason == StopReason::Iterations);
     let stop_reason = cut_short.unwrap_or(reason);
@@ -116,30 +122,28 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
 }
 
 fn search(model: &Model, log: &mut Log) -> StopReason {
-    let reason = search_to_the_end(model, log);
-    // Only now: the searches after the last iteration are one point of the curve together.
-    log.last_point();
-    reason
-}
-
-fn search_to_the_end(model: &Model, log: &mut Log) -> StopReason {
     match starts::routes(model, log.stop) {
         None => search::plain(model, log),
-        Some(starts) => {
-            let mut reason = search::guided(model, starts, log);
-            if reason == StopReason::Iterations && backwards::is_worthwhile(model, log) {
-                reason = backwards::search(model, log);
-            }
-            if reason == StopReason::Iterations && recount::is_worthwhile(model, log) {
-                reason = recount::search(model, log);
-            }
-            let is_lost = reason == StopReason::Iterations && !log.best.is_feasible();
-            if is_lost && model.scenario.planner.polish {
-                return roomier::search(model, log);
-            }
-            reason
-        }
+        Some(starts) => search::guided(model, starts, log),
     }
+}
+
+/// After the last iteration: search in other ways too where that promises a better route, given that none costs less
+/// than `lower`.
+fn search_on(model: &Model, lower: f64, log: &mut Log) -> StopReason {
+    let mut reason = StopReason::Iterations;
+    let goes_on =
+        |reason| reason == StopReason::Iterations && why_stop(model.scenario, log.stop).is_none();
+    if goes_on(reason) && backwards::is_worthwhile(model, lower, log) {
+        reason = backwards::search(model, log);
+    }
+    if goes_on(reason) && recount::is_worthwhile(model, log) {
+        reason = recount::search(model, log);
+    }
+    if goes_on(reason) && roomier::is_worthwhile(model, log) {
+        reason = roomier::search(model, log);
+    }
+    reason
 }
 
 /// Whether all that helps may be tried: no route is given to begin with, and the plain algorithm is not asked for.

@@ -9,6 +9,7 @@ use super::log::Log;
 use super::{StopReason, starts, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
+use crate::scenario::{Seeding, WarmStart};
 
 /// Where each attempt starts, and how many times the requested number of waypoints it uses.
 const ATTEMPTS: [(StartsOf, f64); 3] = [
@@ -27,11 +28,16 @@ const MOST: usize = 64;
 /// Where this many routes with more waypoints could not do with fewer, the request has too few.
 const MOST_FAILED: usize = 2;
 
+/// Whether a search from routes, which ended with the best one of `log`, may still find one that keeps every limit.
+pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
+    let settings = &model.scenario.planner;
+    let is_known = matches!(settings.warm_start, Some(WarmStart::Waypoints(_)));
+    let is_guided = is_known || settings.seeding == Seeding::Tangent;
+    is_guided && settings.polish && settings.waypoints <= MOST && !log.best.is_feasible()
+}
+
 /// Look for a route that keeps every limit, starting from routes with more waypoints.
 pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
-    if model.scenario.planner.waypoints > MOST {
-        return StopReason::Iterations;
-    }
     // It takes long, and the best so far may be all there is.
     log.tell();
     let mut failed = 0;

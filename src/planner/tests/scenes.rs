@@ -73,12 +73,21 @@ pub(in crate::planner) fn disc([x, y, radius, influence]: [f64; 4]) -> Threat {
 }
 
 /// A wall that reaches from one x to another, and from one y to another, at all heights.
-pub(in crate::planner) fn wall([west, east]: [f64; 2], [south, north]: [f64; 2]) -> Threat {
+pub(in crate::planner) fn wall(x: [f64; 2], y: [f64; 2]) -> Threat {
+    soft_wall(x, y, 0.0)
+}
+
+/// The same with a soft zone.
+pub(in crate::planner) fn soft_wall(
+    [west, east]: [f64; 2],
+    [south, north]: [f64; 2],
+    margin: f64,
+) -> Threat {
     let corners = [(west, south), (east, south), (east, north), (west, north)];
     let ring = corners.map(|(x, y)| Point2::new(x, y)).to_vec();
     Threat {
         name: None,
-        shape: Shape::Polygon(Polygon::new(ring, 0.0)),
+        shape: Shape::Polygon(Polygon::new(ring, margin)),
         base: None,
         top: None,
     }

@@ -137,13 +137,24 @@ fn search_on(model: &Model, lower: f64, log: &mut Log) -> StopReason {
     if goes_on(reason) && backwards::is_worthwhile(model, lower, log) {
         reason = backwards::search(model, log);
     }
-    if goes_on(reason) && recount::is_worthwhile(model, log) {
+    if goes_on(reason) && recount::is_worthwhile(model, lower, log) {
         reason = recount::search(model, log);
     }
     if goes_on(reason) && roomier::is_worthwhile(model, log) {
         reason = roomier::search(model, log);
     }
     reason
+}
+
+/// Over level ground, the best route found is mostly the best there is if it costs no more than this share beyond what
+/// is proven. (Over hills the bound knows too little to tell.)
+const PROVEN: f64 = 0.05;
+
+/// Whether over level ground the best route of `log` may be far from the best there is, given that none costs less than
+/// `lower`. Where single routes take long to price, nobody waits for other searches.
+fn is_doubtful(model: &Model, lower: f64, log: &Log) -> bool {
+    let is_proven = log.best.cost <= lower * (1.0 + PROVEN);
+    model.scenario.terrain.is_flat() && !is_proven && !starts::is_vast(model.scenario)
 }
 
 /// Whether all that helps may be tried: no route is given to begin with, and the plain algorithm is not asked for.

@@ -1,12 +1,12 @@
 //! The same search with a few waypoints fewer, and with a few more. Over hills where the limits of a vehicle that turns in
-//! wide bows are felt, they decide which ways are seen at all, and the best of those seen with another number may be
-//! better with this one too.
+//! wide bows are felt, and over level ground where waypoints are scarce, they decide which ways are seen at all, and the
+//! best of those seen with another number may be better with this one too.
 
 use super::aside::aside_with;
 use super::backwards::WIDE_TURNS_DEG;
 use super::finish::finish_from;
 use super::log::Log;
-use super::{StopReason, is_from_scratch, newton, starts};
+use super::{StopReason, is_doubtful, is_from_scratch, newton, starts};
 use crate::cost::Model;
 
 /// The numbers of waypoints, as shares of the requested one.
@@ -15,14 +15,20 @@ const SHARES: [f64; 2] = [0.8, 1.2];
 /// Where more waypoints than this are requested, nothing is tried: it would take long.
 const MOST: usize = 64;
 
-/// Whether a search that ended with the best route of `log` is worth others.
-pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
+/// Whether a search that ended with the best route of `log` is worth others, given that no route costs less than `lower`.
+pub(super) fn is_worthwhile(model: &Model, lower: f64, log: &Log) -> bool {
+    let are_ways_missed = || {
+        if model.scenario.terrain.is_flat() {
+            is_doubtful(model, lower, log)
+        } else {
+            model.scenario.vehicle.max_turn_deg <= WIDE_TURNS_DEG
+                && newton::is_felt(model, &log.route)
+        }
+    };
     is_from_scratch(model.scenario)
-        && !model.scenario.terrain.is_flat()
-        && model.scenario.vehicle.max_turn_deg <= WIDE_TURNS_DEG
         && model.scenario.planner.waypoints <= MOST
         && log.best.is_feasible()
-        && newton::is_felt(model, &log.route)
+        && are_ways_missed()
 }
 
 /// Search with other numbers of waypoints, and keep what comes of the routes found if it is better.
@@ -160,16 +166,17 @@ mod tests {
     }
 
     #[test]
-    fn level_ground_sharp_turns_known_routes_and_many_waypoints_are_searched_once() {
+    fn near_routes_sharp_turns_known_routes_and_many_waypoints_are_searched_once() {
         let mut scenario = mountain(100.0, true);
         scenario.vehicle.max_turn_deg = WIDE_TURNS_DEG;
-        let worthwhile = |scenario: &Scenario| {
+        let worthwhile_if_proven = |scenario: &Scenario, share: f64| {
             let model = Model::new(scenario);
             let mut nobody = Nobody;
             let mut log = Log::new(&model, &mut nobody, &Nobody);
             log.offer_unpriced(&plan(scenario, &mut Nobody, &Nobody).waypoints);
-            is_worthwhile(&model, &log)
+            is_worthwhile(&model, share * log.best.cost, &log)
         };
+        let worthwhile = |scenario: &Scenario| worthwhile_if_proven(scenario, 0.99);
         assert!(worthwhile(&scenario));
         let but = |change: fn(&mut Scenario)| {
             let mut scenario = scenario.clone();
@@ -188,5 +195,7 @@ mod tests {
         assert!(!but(
             |scenario| scenario.vehicle.max_turn_deg = WIDE_TURNS_DEG + 1.0
         ));
+        scenario.terrain = Terrain::Flat(Flat { elevation: 0.0 });
+        assert!(worthwhile_if_proven(&scenario, 0.9));
     }
 }

@@ -178,6 +178,10 @@ mod tests {
             assert_eq!(worthwhile(&open), expected, "{max_turn_deg}");
         }
         open.vehicle.max_turn_deg = 60.0;
+        assert!(!worthwhile_if_proven(&open, 0.9));
+        open.threats = vec![disc([500.0, 500.0, 50.0, 80.0])];
         assert!(worthwhile_if_proven(&open, 0.9));
+        open.threats = vec![disc([100.0, 900.0, 10.0, 10.0])];
+        assert!(!worthwhile_if_proven(&open, 0.9));
     }
 }

@@ -196,6 +196,7 @@ mod tests {
             |scenario| scenario.vehicle.max_turn_deg = WIDE_TURNS_DEG + 1.0
         ));
         scenario.terrain = Terrain::Flat(Flat { elevation: 0.0 });
+        scenario.threats = vec![disc([600.0, 550.0, 50.0, 80.0])];
         assert!(worthwhile_if_proven(&scenario, 0.9));
     }
 }

@@ -266,8 +266,11 @@ export const WALLED = {
   threats: [{ kind: 'polygon', name: 'wall', vertices: [{ x: -500, y: 450 }, { x: 1500, y: 450 }, { x: 1500, y: 550 }, { x: -500, y: 550 }] }],
 };
 
-/** The contrasts (WCAG 2.2) of a colour of each of these nodes, such as `color`, with its background. */
-export const contrasts = (page, selector, name) => page.locator(selector).evaluateAll((nodes, property) => nodes.map((node) => {
+/**
+ * The contrasts (WCAG 2.2) of a colour of each of these nodes, such as `color`, with its background. They are looked up
+ * and measured in one step: a form that is filled in anew in between would leave nodes without a style.
+ */
+export const contrasts = (page, selector, name) => page.evaluate(([nodes, property]) => [...document.querySelectorAll(nodes)].map((node) => {
   const style = getComputedStyle(node);
   const linear = (part) => (part / 255 <= 0.04045 ? part / 255 / 12.92 : ((part / 255 + 0.055) / 1.055) ** 2.4);
   const [light, dark] = [style[property], style.backgroundColor].map((css) => {
@@ -275,4 +278,4 @@ export const contrasts = (page, selector, name) => page.locator(selector).evalua
     return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
   }).sort((a, b) => b - a);
   return light / dark;
-}), name);
+}), [selector, name]);

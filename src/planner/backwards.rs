@@ -3,8 +3,9 @@
 //! either direction finds ways that the other misses.
 
 use super::aside::aside;
+use super::doubt::is_doubtful;
 use super::log::Log;
-use super::{StopReason, is_doubtful, is_from_scratch, newton, starts};
+use super::{StopReason, is_from_scratch, newton, starts};
 use crate::cost::Model;
 
 /// Over level ground either direction finds the same ways with sharper turns than this, degrees.

@@ -9,6 +9,7 @@ mod beside;
 mod blocks;
 mod certificate;
 mod coding;
+mod doubt;
 mod fewer;
 mod finish;
 mod guide;
@@ -43,11 +44,10 @@ pub(crate) use smoothing::keeps_limits;
 pub use crate::cost::CostFigures;
 
 use crate::cost::Model;
-use crate::geometry::{Point3, Rect};
+use crate::geometry::Point3;
 use crate::optimizer::Objective;
 use crate::scenario::{Quadrature, Scenario, Seeding};
 use crate::seeding;
-use crate::threat::Threat;
 use coding::Coding;
 use log::Log;
 use objective::Routes;
@@ -145,24 +145,6 @@ fn search_on(model: &Model, lower: f64, log: &mut Log) -> StopReason {
         reason = roomier::search(model, log);
     }
     reason
-}
-
-/// Over level ground, the best route found is mostly the best there is if it costs no more than this share beyond what
-/// is proven. (Over hills the bound knows too little to tell.)
-const PROVEN: f64 = 0.05;
-
-/// Whether over level ground the best route of `log` may be far from the best there is, given that none costs less than
-/// `lower`. No way is missed where no threat is near the straight one, and where single routes take long to price, nobody
-/// waits for other searches.
-fn is_doubtful(model: &Model, lower: f64, log: &Log) -> bool {
-    let scenario = model.scenario;
-    let is_proven = log.best.cost <= lower * (1.0 + PROVEN);
-    let straight = Rect::around([scenario.start.xy(), scenario.target.xy()]);
-    let is_near = |threat: &Threat| straight.is_some_and(|way| threat.extent().meets(&way));
-    scenario.terrain.is_flat()
-        && !is_proven
-        && scenario.threats.iter().any(is_near)
-        && !starts::is_vast(scenario)
 }
 
 /// Whether all that helps may be tried: no route is given to begin with, and the plain algorithm is not asked for.

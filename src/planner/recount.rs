@@ -4,9 +4,10 @@
 
 use super::aside::aside_with;
 use super::backwards::WIDE_TURNS_DEG;
+use super::doubt::is_doubtful;
 use super::finish::finish_from;
 use super::log::Log;
-use super::{StopReason, is_doubtful, is_from_scratch, newton, starts};
+use super::{StopReason, is_from_scratch, newton, starts};
 use crate::cost::Model;
 
 /// The numbers of waypoints, as shares of the requested one.

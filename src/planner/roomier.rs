@@ -9,7 +9,6 @@ use super::log::Log;
 use super::{StopReason, starts, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
-use crate::scenario::{Seeding, WarmStart};
 
 /// Where each attempt starts, and how many times the requested number of waypoints it uses.
 const ATTEMPTS: [(StartsOf, f64); 3] = [
@@ -31,9 +30,10 @@ const MOST_FAILED: usize = 2;
 /// Whether a search from routes, which ended with the best one of `log`, may still find one that keeps every limit.
 pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
     let settings = &model.scenario.planner;
-    let is_known = matches!(settings.warm_start, Some(WarmStart::Waypoints(_)));
-    let is_guided = is_known || settings.seeding == Seeding::Tangent;
-    is_guided && settings.polish && settings.waypoints <= MOST && !log.best.is_feasible()
+    starts::are_wanted(model.scenario)
+        && settings.polish
+        && settings.waypoints <= MOST
+        && !log.best.is_feasible()
 }
 
 /// Look for a route that keeps every limit, starting from routes with more waypoints.

@@ -75,15 +75,20 @@ impl From<Refusal> for Problem {
     }
 }
 
+impl Problem {
+    /// For a stored plan that cannot be read, of which its caller need not know more.
+    fn damaged(error: &str) -> Self {
+        tracing::error!(error, "a stored plan cannot be read");
+        Self::Internal
+    }
+}
+
 impl From<Unread> for Problem {
     fn from(unread: Unread) -> Self {
         match unread {
             Unread::Unreachable(error) => Self::unreachable_datasets(&error),
             Unread::NoGround(_) => Self::NoGround(unread.to_string()),
-            Unread::Damaged(_) => {
-                tracing::error!(error = %unread, "a stored plan cannot be read");
-                Self::Internal
-            }
+            Unread::Damaged(_) => Self::damaged(&unread.to_string()),
         }
     }
 }
@@ -100,10 +105,7 @@ impl From<ExportError> for Problem {
                 detail: fault.detail,
             },
             ExportError::Unread(unread) => unread.into(),
-            ExportError::Damaged(_) => {
-                tracing::error!(error = detail, "a stored plan cannot be read");
-                Self::Internal
-            }
+            ExportError::Damaged(_) => Self::damaged(&detail),
         }
     }
 }

@@ -40,6 +40,7 @@ use super::{Stop, same, why_stop};
 use crate::cost::Model;
 use crate::geometry::{LEVEL, Point2, Point3, Vector2};
 use crate::optimizer::Fitness;
+use crate::scenario::{Scenario, Seeding, WarmStart};
 use height::{lifted, winding};
 use shapes::Shapes;
 
@@ -69,9 +70,18 @@ pub(super) struct Starts {
     pub(super) evaluations: u64,
 }
 
+/// Whether a search of `scenario` starts from routes; else the algorithm runs alone.
+pub(super) fn are_wanted(scenario: &Scenario) -> bool {
+    let settings = &scenario.planner;
+    let is_known = matches!(settings.warm_start, Some(WarmStart::Waypoints(_)));
+    is_known || settings.seeding == Seeding::Tangent
+}
+
 /// Where the search of `model` starts; `None` for the algorithm alone.
 pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
-    starts_from(Shapes::find, model, stop)
+    are_wanted(model.scenario)
+        .then(|| starts_from(Shapes::find, model, stop))
+        .flatten()
 }
 
 /// As [`routes`], where a search from those has found no route that keeps every limit: along ledges too; `None` where

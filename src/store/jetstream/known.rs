@@ -169,7 +169,7 @@ impl Known {
     }
 
     fn kept(&self, id: PlanId) -> Option<&Record> {
-        kept(self.plans.get(&id)?)
+        self.plans.get(&id)?.kept()
     }
 
     pub(super) fn is_queued(&self, id: PlanId) -> bool {
@@ -229,7 +229,7 @@ impl Known {
         };
         let mut plans: Vec<Plan> = older
             .rev()
-            .filter_map(|(_, standing)| kept(standing))
+            .filter_map(|(_, standing)| standing.kept())
             .filter(|record| wanted(&record.plan))
             .take(query.limit)
             .map(|record| record.plan.clone())
@@ -272,7 +272,7 @@ impl Known {
     pub(super) fn datasets(&self) -> Vec<DatasetUse> {
         let mut uses: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
         for standing in self.plans.values() {
-            if let Some(record) = kept(standing)
+            if let Some(record) = standing.kept()
                 && let Some(dataset) = &record.dataset
             {
                 let (active, plans) = uses.entry(dataset).or_default();
@@ -422,14 +422,6 @@ impl Known {
             .collect();
         due.sort_unstable();
         due.into_iter().take(at_most).map(|(_, _, id)| id).collect()
-    }
-}
-
-/// The record of a plan, unless it has been removed.
-fn kept(standing: &Standing) -> Option<&Record> {
-    match &*standing.state {
-        State::Kept(record) => Some(record),
-        State::Buried(_) => None,
     }
 }
 

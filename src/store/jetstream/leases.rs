@@ -84,6 +84,11 @@ impl Leases {
         }
     }
 
+    /// Whether this run is held here.
+    pub(super) fn holds(&self, id: PlanId, attempt: u64) -> bool {
+        self.appended_last(id, attempt).is_some()
+    }
+
     /// Number of the step that a run appended last.
     pub(super) fn appended_last(&self, id: PlanId, attempt: u64) -> Option<u64> {
         let all = self.0.lock();

@@ -12,7 +12,7 @@ use uuid::Uuid;
 use super::lane::Lane;
 use super::steps::Change;
 use crate::job::{Event, NumberedEvent, Owner, Plan, PlanId, Status, Submission};
-use crate::store::{LastEvent, Retention, StoreError, Tombstone};
+use crate::store::{Ending, LastEvent, Retention, StoreError, Tombstone};
 
 /// A step, as it is written.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -177,6 +177,16 @@ impl Record {
     pub(super) fn is_run_under(&self, attempt: u64) -> bool {
         self.plan.status == Status::Running && self.attempt == attempt
     }
+
+    /// Whether the run of this attempt has ended it so. Others may end it too, when its worker seems lost.
+    pub(super) fn is_ended_by(&self, attempt: u64, ending: &Ending) -> bool {
+        self.attempt == attempt
+            && match ending {
+                // Only a run leaves one.
+                Ending::Result { .. } => self.result.is_some(),
+                Ending::Failed(failure) => self.plan.error.as_ref() == Some(failure),
+            }
+    }
 }
 
 impl Grave {
@@ -299,5 +309,44 @@ impl TryFrom<StreamMessage> for Placed {
             sequence: message.sequence,
             step: Step::read(&message.payload)?,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::FailureKind;
+
+    #[test]
+    fn an_end_is_that_run_s_which_left_its_result_or_its_failure() {
+        let result = Ending::Result {
+            cancelled: false,
+            stop_reason: "iterations".to_owned(),
+            feasible: false,
+            best_cost: None,
+            evaluations: 0,
+            iteration: 0,
+            document: "{}".to_owned(),
+        };
+        let failure = |kind: FailureKind| kind.because("said");
+        let failed = Ending::Failed(failure(FailureKind::PlannerPanic));
+        let mut record = Record::example();
+        record.plan.start(1).expect("it waits");
+        record.attempt = 2;
+        assert!(!record.is_ended_by(2, &result) && !record.is_ended_by(2, &failed));
+
+        let mut lost = record.clone();
+        let by_others = failure(FailureKind::WorkerLost);
+        lost.plan.fail(by_others, 2).expect("it runs");
+        assert!(!lost.is_ended_by(2, &result) && !lost.is_ended_by(2, &failed));
+
+        let mut own = record.clone();
+        let panic = failure(FailureKind::PlannerPanic);
+        own.plan.fail(panic, 2).expect("it runs");
+        assert!(own.is_ended_by(2, &failed) && !own.is_ended_by(1, &failed));
+
+        record.plan.end(Status::Succeeded, 2).expect("it runs");
+        record.result = Some(Document::result(Uuid::nil(), 2, "{}"));
+        assert!(record.is_ended_by(2, &result) && !record.is_ended_by(1, &result));
     }
 }

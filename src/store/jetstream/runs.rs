@@ -37,7 +37,15 @@ impl JetStream {
         attempt: u64,
         end: &End,
     ) -> Result<Plan, StoreError> {
-        let finished = self.try_to_finish(id, attempt, end).await;
+        let finished = match self.try_to_finish(id, attempt, end).await {
+            Err(StoreError::LeaseLost(_)) => self.finished_before(id, attempt, end),
+            finished => finished,
+        };
+        if finished.is_ok()
+            && let Some(job) = self.leases.let_go(id, attempt)
+        {
+            answer(id, &job, AckKind::Ack).await;
+        }
         self.let_go_when_lost(id, attempt, finished)
     }
 
@@ -192,11 +200,19 @@ impl JetStream {
             })
             .await;
         let standing = finished.map_err(|error| lost(error, id))?;
-        if let Some(job) = self.leases.let_go(id, attempt) {
-            answer(id, &job, AckKind::Ack).await;
-        }
         let record = standing.record(id, end.at_ms)?;
         Ok(record.plan.clone())
+    }
+
+    /// The plan as an earlier call has ended it whose answer was lost: until it is answered, the run holds its job.
+    fn finished_before(&self, id: PlanId, attempt: u64, end: &End) -> Result<Plan, StoreError> {
+        let standing = self.view.standing(id);
+        let record = standing.as_ref().and_then(|standing| standing.kept());
+        record
+            .filter(|record| record.is_ended_by(attempt, &end.ending))
+            .filter(|_| self.leases.holds(id, attempt))
+            .map(|record| record.plan.clone())
+            .ok_or(StoreError::LeaseLost(id))
     }
 
     /// The job comes again after `pause`.
@@ -270,10 +286,10 @@ impl JetStream {
 
 /// The record of a plan that is being run under this attempt.
 fn own(standing: &Standing, id: PlanId, attempt: u64) -> Result<&Record, StoreError> {
-    match &*standing.state {
-        State::Kept(record) if record.is_run_under(attempt) => Ok(record),
-        _ => Err(StoreError::LeaseLost(id)),
-    }
+    let record = standing.kept();
+    record
+        .filter(|record| record.is_run_under(attempt))
+        .ok_or(StoreError::LeaseLost(id))
 }
 
 /// A plan that does not exist cannot be run under any lease.

@@ -111,7 +111,15 @@ impl Standing {
         }
     }
 
-    /// The record of a plan that has not been removed.
+    /// The record of the plan, unless it has been removed.
+    pub(super) fn kept(&self) -> Option<&Record> {
+        match &*self.state {
+            State::Kept(record) => Some(record),
+            State::Buried(_) => None,
+        }
+    }
+
+    /// As [`Standing::kept`]; otherwise, whether and when it was removed.
     ///
     /// # Errors
     /// [`StoreError::Gone`], [`StoreError::NotFound`].

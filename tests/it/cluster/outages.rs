@@ -15,7 +15,9 @@ use super::{open, open_as};
 use crate::support::lives::{a_run_of, running};
 use crate::support::nats::{Cluster, NatsServer};
 use crate::support::patience::{eventually, in_time};
-use crate::support::plans::{ending, history, history_to_its_end, kind, point, submission, until};
+use crate::support::plans::{
+    ending, failure, history, history_to_its_end, kind, point, statuses, submission, until,
+};
 use crate::support::process::Service;
 use crate::support::stores::node;
 
@@ -25,6 +27,14 @@ const SILENCE: Duration = Duration::from_secs(13);
 /// Waits until the store is healthy.
 async fn until_sound(store: &dyn Store) {
     eventually(async || store.health().await.is_ok()).await;
+}
+
+/// Where the search was, for a convergence point.
+fn iteration(event: &Event) -> Option<usize> {
+    match event {
+        Event::Convergence(point) => Some(point.iteration),
+        _ => None,
+    }
 }
 
 /// Retries a step, as a worker does, until a leading server answers.
@@ -151,6 +161,31 @@ async fn a_webhook_stays_with_its_sender_until_the_attempt_is_recorded() {
     assert_eq!(due(&*follower).await, 1);
 }
 
+/// What is sent to a silent server is done when it can be heard again.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_end_whose_answer_was_lost_is_answered_again() {
+    let server = NatsServer::start();
+    let store = open(&server.address()).await;
+    let id = store.submit(submission()).await.unwrap().plan.id;
+    let lease = store.claim().await.unwrap();
+    let end = failure().after(vec![point(1, None)], 0);
+    server.pause();
+    assert_eq!(
+        kind(store.finish(&lease, end.clone()).await),
+        Err("unavailable")
+    );
+    server.resume();
+    until(&*store, id, |plan| plan.status == Status::Failed).await;
+
+    let other = ending(Status::Succeeded).at(0);
+    let plan = persist(|| store.finish(&lease, end.clone())).await;
+    assert_eq!(plan, store.get(id).await.unwrap());
+    assert_eq!(history(&*store, id).await.len(), 2 + 1 + 2);
+    for later in [end, other] {
+        assert_eq!(kind(store.finish(&lease, later).await), Err("lease lost"));
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_run_survives_the_loss_of_the_leader() {
     let mut cluster = Cluster::start().await;
@@ -175,7 +210,14 @@ async fn a_run_survives_the_loss_of_the_leader() {
     persist(|| store.finish(&lease, end.clone())).await;
     until(&*follower, id, |plan| plan.status == Status::Succeeded).await;
     let told = history_to_its_end(&*follower, id).await;
-    assert_eq!(told.len(), 2 + 5 + 2);
+    // A claim during the election may have been given up: the plan has been queued and claimed again since.
+    let begun = told.len() - (1 + 5 + 2);
+    assert_eq!(
+        statuses(&told[begun..]),
+        [Status::Running, Status::Succeeded]
+    );
+    let points = told[begun + 1..].iter().take(5).map(iteration);
+    assert_eq!(points.collect::<Vec<_>>(), [0, 1, 2, 3, 4].map(Some));
     assert_eq!(told, history(&*store, id).await);
 }
 

@@ -23,6 +23,7 @@ mod spare;
 mod surplus;
 pub(super) mod tangents;
 mod thin;
+mod thin_band;
 mod trails;
 mod ways;
 mod wider;

@@ -7,6 +7,7 @@
 //! of all cannot be flown as it is (`few`).
 
 use super::net::{self, Found, Tree};
+use super::thin_band::is_thin_band;
 use super::{few, levels, may_turn, may_turn_along};
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::cost::{Model, metre};
@@ -21,6 +22,12 @@ const PLACES: usize = 160;
 
 /// The same over hills, where passes are narrow.
 const PLACES_OVER_HILLS: usize = 320;
+
+/// The same where the band is thin for the ground below it.
+const PLACES_IN_A_THIN_BAND: usize = 640;
+
+/// There, so many times as many routes are taken: more of them turn out to be the best once they are in place.
+const MORE_IN_A_THIN_BAND: usize = 2;
 
 /// The net covers all points over which the way is at most this many times the direct one; the same limit holds for
 /// legs.
@@ -57,7 +64,8 @@ pub(super) fn routes(
     known: f64,
     is_over: &dyn Fn() -> bool,
 ) -> (Found, Vec<Vec<Point3>>) {
-    let places = places(model);
+    let (spots, count) = fineness(model.scenario, count);
+    let places = places(model, spots);
     let mut legs = Legs::new(model, &places, known, is_over);
     let trees = [0, places.len() - 1].map(|end| legs.cheapest(end));
     if legs.watch.is_broken_off {
@@ -84,14 +92,22 @@ pub(super) fn routes(
     (found, few)
 }
 
-/// Start, a net of spots in the middle of the band, target.
-fn places(model: &Model) -> Vec<Point3> {
-    let scenario = model.scenario;
-    let count = if scenario.terrain.is_flat() {
-        PLACES
+/// Spots of the net, and the number of routes taken from it where `count` are wanted.
+fn fineness(scenario: &Scenario, count: usize) -> (usize, usize) {
+    if scenario.terrain.is_flat() {
+        return (PLACES, count);
+    }
+    let spots = net::spots(scenario, PLACES_OVER_HILLS, DETOUR);
+    if !is_vast(scenario) && is_thin_band(scenario, &spots) {
+        (PLACES_IN_A_THIN_BAND, MORE_IN_A_THIN_BAND * count)
     } else {
-        PLACES_OVER_HILLS
-    };
+        (PLACES_OVER_HILLS, count)
+    }
+}
+
+/// Start, a net of about `count` spots in the middle of the band, target.
+fn places(model: &Model, count: usize) -> Vec<Point3> {
+    let scenario = model.scenario;
     let spots = net::spots(scenario, count, DETOUR);
     let near = NEAR * spots.step;
     let over = |&spot| levels::over(scenario, spot, near);
@@ -421,7 +437,7 @@ mod tests {
     fn measuring_legs_on_demand_changes_no_chain() {
         let scenario = hilly_scenario();
         let model = Model::new(&scenario);
-        let places = places(&model);
+        let places = places(&model, PLACES_OVER_HILLS);
         let (mut late, mut early) = (
             Legs::new(&model, &places, 0.0, &|| false),
             Legs::new(&model, &places, 0.0, &|| false),

@@ -12,6 +12,7 @@ mod heap;
 mod height;
 mod known;
 mod ledges;
+mod legs;
 mod levels;
 mod net;
 mod over;
@@ -25,6 +26,7 @@ pub(super) mod tangents;
 mod thin;
 mod thin_band;
 mod trails;
+mod vast;
 mod ways;
 mod wider;
 mod worth;
@@ -32,8 +34,8 @@ mod worth;
 pub(super) use count::with_waypoints;
 pub(super) use heap::spread;
 pub(super) use height::steepest;
-pub(super) use roadmap::is_vast;
 pub(super) use round::at_heights_of;
+pub(super) use vast::is_vast;
 
 use super::polish::{Polish, Steps};
 use super::price::price;
@@ -137,10 +139,10 @@ fn with_as_many(
     is_over: &dyn Fn() -> bool,
 ) -> Vec<(Fitness, Vec<Point3>)> {
     let mut priced: Vec<(Fitness, Vec<Point3>)> = Vec::new();
-    let is_vast = roadmap::is_vast(model.scenario);
+    let is_scene_vast = is_vast(model.scenario);
     for shape in shapes {
         // The first will do where looking at another takes time that is not there.
-        if is_vast && !priced.is_empty() && is_over() {
+        if is_scene_vast && !priced.is_empty() && is_over() {
             break;
         }
         let route = with_waypoints(model, shape, waypoints);

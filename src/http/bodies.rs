@@ -14,6 +14,9 @@ use super::problem::{Busy, Problem};
 /// Bytes of each body that come out of the room for beginnings. Most bodies have no more.
 const BEGINNING: usize = 64 * 1024;
 
+/// Bytes of a block that has room for what comes next, at most.
+const BLOCK: usize = 256 * 1024;
+
 /// The room for beginnings is this part of the whole.
 const FOR_BEGINNINGS: usize = 4;
 
@@ -49,16 +52,18 @@ impl Bodies {
             rest: None,
         };
         Growing {
-            whole: Vec::new(),
+            blocks: Vec::new(),
+            length: 0,
             longest,
             share,
         }
     }
 }
 
-/// A body, as far as it has come.
+/// A body, as far as it has come: in blocks, since one that grew as a whole would be there twice each time it is moved.
 pub(super) struct Growing {
-    whole: Vec<u8>,
+    blocks: Vec<Vec<u8>>,
+    length: usize,
     longest: usize,
     share: Share,
 }
@@ -66,32 +71,53 @@ pub(super) struct Growing {
 impl Growing {
     /// The next bytes of it, which must not make it longer than announced.
     pub(super) fn add(&mut self, piece: &[u8]) -> Result<(), Problem> {
-        let (length, capacity) = (self.whole.len(), self.whole.capacity());
-        let needed = length + piece.len();
-        if needed > capacity {
-            // By half at least, since each time all of it is moved.
-            let ample = (capacity + capacity / 2).min(self.longest).max(needed);
-            self.share.grow(ample - capacity)?;
-            self.whole.reserve_exact(ample - length);
+        let spare = |block: &Vec<u8>| block.capacity() - block.len();
+        let spare = self.blocks.last().map_or(0, spare);
+        let (fits, rest) = piece.split_at(spare.min(piece.len()));
+        if let Some(block) = self.blocks.last_mut() {
+            block.extend_from_slice(fits);
+            self.length += fits.len();
         }
-        self.whole.extend_from_slice(piece);
+        if !rest.is_empty() {
+            let mut block = self.block(rest.len())?;
+            block.extend_from_slice(rest);
+            self.blocks.push(block);
+            self.length += rest.len();
+        }
         Ok(())
+    }
+
+    /// An empty block with room for `least` bytes; for more, the more has come.
+    fn block(&mut self, least: usize) -> Result<Vec<u8>, Problem> {
+        let ample = (self.length / 2).min(BLOCK);
+        let size = ample.min(self.longest - self.length).max(least);
+        self.share.grow(size)?;
+        Ok(Vec::with_capacity(size))
     }
 
     /// How much has come.
     pub(super) fn len(&self) -> usize {
-        self.whole.len()
+        self.length
     }
 
     /// All of it; it has its share until nobody needs it.
-    pub(super) fn whole(self) -> Bytes {
+    pub(super) fn whole(mut self) -> Bytes {
+        if self.blocks.len() > 1 {
+            let mut whole = Vec::with_capacity(self.length);
+            // Each block is given back before the next one is copied.
+            for block in self.blocks.drain(..) {
+                whole.extend_from_slice(&block);
+            }
+            self.blocks.push(whole);
+        }
         Bytes::from_owner(self)
     }
 }
 
+/// A whole body has one block, or none.
 impl AsRef<[u8]> for Growing {
     fn as_ref(&self) -> &[u8] {
-        &self.whole
+        self.blocks.first().map_or(&[], Vec::as_slice)
     }
 }
 
@@ -177,9 +203,29 @@ mod tests {
         for piece in vec![7; MIB].chunks(1000) {
             body.add(piece).expect("room");
             let left = bodies.beginnings.available_permits() + bodies.rest.available_permits();
-            assert_eq!(left, 8 * MIB - body.whole.capacity());
+            assert_eq!(left, 8 * MIB - occupied(&body));
         }
-        assert_eq!((body.len(), body.whole.capacity()), (MIB, MIB));
+        assert_eq!((body.len(), occupied(&body)), (MIB, MIB));
+    }
+
+    fn occupied(body: &Growing) -> usize {
+        body.blocks.iter().map(Vec::capacity).sum()
+    }
+
+    #[test]
+    fn a_whole_body_is_its_pieces_in_their_order() {
+        let bytes: Vec<u8> = (0..=250).cycle().take(MIB).collect();
+        for longest in [0, 1, 1000, BEGINNING, MIB] {
+            for piece in [1, 999, BEGINNING] {
+                let mut body = Bodies::new(8 * MIB, MIB).begin(longest);
+                for piece in bytes[..longest].chunks(piece) {
+                    body.add(piece).expect("room");
+                }
+                assert!(body.blocks.len() < 40, "{}", body.blocks.len());
+                assert_eq!(body.len(), longest);
+                assert!(body.whole() == bytes[..longest]);
+            }
+        }
     }
 
     #[test]

@@ -194,7 +194,6 @@ pub(super) fn along_strings(
         .iter()
         .any(|threat| over::passable(scenario, threat))
     {
-        follow(&Obstacles::soft(scenario, in_the_way), STRINGS);
         follow(&Obstacles::hard(scenario, in_the_way), STRINGS);
     }
     let steep = steep_ground(scenario);

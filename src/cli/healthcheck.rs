@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use axum::http::Uri;
+use axum::http::uri::PathAndQuery;
 use clap::Args;
 
 /// Timeout for the connection, and for each read and write.
@@ -13,7 +14,7 @@ const TIMEOUT: Duration = Duration::from_secs(3);
 
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Address to ask
+    /// Address to ask; /readyz there, unless it names another path
     #[arg(
         long,
         env = "NOCTULE_HEALTHCHECK_URL",
@@ -33,7 +34,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         authority.host().trim_matches(['[', ']']),
         authority.port_u16().unwrap_or(80),
     );
-    let path = url.path_and_query().map_or("/", |path| path.as_str());
+    let path = url.path_and_query().map(PathAndQuery::as_str);
+    // The page at the root is there whether or not the service is ready.
+    let path = path.filter(|path| *path != "/").unwrap_or("/readyz");
     let head =
         ask(address, authority.as_str(), path).with_context(|| format!("no answer from {url}"))?;
     match head.split(' ').nth(1) {

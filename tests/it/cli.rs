@@ -216,12 +216,16 @@ fn help_and_version_exit_0() {
 async fn healthcheck_exits_0_when_the_service_is_ready() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &[]);
-    assert_eq!(
-        run(&["healthcheck", "--url", &service.url("/readyz")], "")
-            .status
-            .code(),
-        Some(0)
-    );
+    for path in ["/readyz", "/", ""] {
+        let ready = run(&["healthcheck", "--url", &service.url(path)], "");
+        assert_eq!(ready.status.code(), Some(0), "{path}");
+    }
+    // Alive and not ready, while the page at the root is there.
+    let second = Service::start(directory.path(), &[]);
+    let unready = run(&["healthcheck", "--url", &second.url("")], "");
+    assert_eq!(unready.status.code(), Some(1));
+    let reason = String::from_utf8(unready.stderr).expect("UTF-8");
+    assert!(reason.contains("answers 503"), "{reason}");
     let elsewhere = run(&["healthcheck", "--url", &service.url("/nothing")], "");
     assert_eq!(elsewhere.status.code(), Some(1));
     let reason = String::from_utf8(elsewhere.stderr).expect("UTF-8");

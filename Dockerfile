@@ -39,6 +39,11 @@ COPY --from=builder /build/target/release/noctule /usr/local/bin/noctule
 COPY LICENSE-MIT LICENSE-APACHE /usr/share/doc/noctule/
 COPY --from=builder --chown=65532:65532 /data /data
 VOLUME /data
+# The variables of settings, so that those of a container override them, and `noctule store` looks at the same place.
+# Nobody can reach the loopback of a container from outside. With keys, the switch changes nothing.
+ENV NOCTULE_DATA_DIR=/data \
+    NOCTULE_LISTEN=0.0.0.0:8080 \
+    NOCTULE_ALLOW_ANONYMOUS=true
 # For SQLite's temporary files, because the root file system may be read-only.
 ENV SQLITE_TMPDIR=/data
 # A number, so that an orchestrator can see that it is not root.
@@ -47,5 +52,4 @@ EXPOSE 8080
 STOPSIGNAL SIGTERM
 HEALTHCHECK --interval=10s --timeout=5s --start-period=10s CMD ["noctule", "healthcheck"]
 ENTRYPOINT ["noctule"]
-# Nobody can reach the loopback of a container from outside. With keys, the switch changes nothing.
-CMD ["serve", "--listen", "0.0.0.0:8080", "--allow-anonymous", "--data-dir", "/data"]
+CMD ["serve"]

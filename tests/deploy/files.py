@@ -38,6 +38,11 @@ def instruction(name):
 
 
 IMAGE_COMMAND = json.loads(instruction("CMD"))
+IMAGE_VARIABLES = {
+    name: value
+    for words in re.findall(r"^ENV +(.*)$", DOCKERFILE, re.MULTILINE)
+    for name, value in re.findall(r"(\S+)=(\S+)", words)
+}
 IMAGE_HEALTHCHECK = json.loads(instruction("HEALTHCHECK").partition("CMD ")[2])
 IMAGE_PORT = int(instruction("EXPOSE"))
 IMAGE_USER = int(instruction("USER").split(":")[0])
@@ -56,7 +61,7 @@ class Node:
 
     def call(self, *arguments, **variables):
         """Runs the program with these arguments in the container's environment."""
-        environment = {"PATH": os.environ["PATH"], "HOME": "/nowhere"} | self.variables | variables
+        environment = {"PATH": os.environ["PATH"], "HOME": "/nowhere"} | IMAGE_VARIABLES | self.variables | variables
         return subprocess.run([NOCTULE, *arguments], env=environment, capture_output=True, text=True, check=False)
 
     def settings(self):

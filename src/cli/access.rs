@@ -19,12 +19,7 @@ const VARIABLE: &str = "NOCTULE_KEYS";
 /// # Errors
 /// When the keys cannot be read, and when there are none although other machines can reach the service.
 pub(super) fn open(config: &Config, clock: Clock) -> anyhow::Result<Access> {
-    let of_environment = match std::env::var(VARIABLE) {
-        Ok(text) => Some(text).filter(|text| !text.trim().is_empty()),
-        Err(std::env::VarError::NotPresent) => None,
-        Err(error) => return Err(error).context(VARIABLE),
-    };
-    let keys = match (&config.keys_file, of_environment) {
+    let keys = match (&config.keys_file, of_environment()?) {
         (Some(_), Some(_)) => bail!("there are keys in both keys_file and {VARIABLE}; give one"),
         (Some(path), None) => Some(read(path)?),
         (None, Some(text)) => Some(Keys::read(&text).context(VARIABLE)?),
@@ -48,6 +43,24 @@ pub(super) fn open(config: &Config, clock: Clock) -> anyhow::Result<Access> {
         ..Settings::default()
     };
     Ok(Access::new(keys, settings, clock))
+}
+
+/// The text of the keys, where the environment has it.
+fn of_environment() -> anyhow::Result<Option<String>> {
+    match std::env::var(VARIABLE) {
+        Ok(text) => Ok(Some(text).filter(|text| !text.trim().is_empty())),
+        Err(std::env::VarError::NotPresent) => Ok(None),
+        Err(error) => Err(error).context(VARIABLE),
+    }
+}
+
+/// What the printed settings say of keys in the environment, which are no setting.
+///
+/// # Errors
+/// When they are no text.
+pub(super) fn comment() -> anyhow::Result<Option<String>> {
+    let comment = |_| format!("# The keys are set by {VARIABLE}, and not shown\n");
+    Ok(of_environment()?.map(comment))
 }
 
 /// The names that the service answers to. Without keys it is for this machine alone, which excludes pages with other

@@ -151,6 +151,18 @@ fn a_negative_number_is_read_as_a_value() {
     assert!(text.contains("unexpected argument '-1'"), "{text}");
 }
 
+/// They are no setting, but whoever looks at the settings wants to know.
+#[test]
+fn keys_in_the_environment_are_printed_as_set_and_not_shown() {
+    let text = printed(&[("NOCTULE_KEYS", "hush")], &[]);
+    assert!(text.starts_with("# The keys are set by NOCTULE_KEYS, and not shown\n"));
+    assert!(!text.contains("hush"), "{text}");
+    for none in ["", " \n"] {
+        let text = printed(&[("NOCTULE_KEYS", none)], &[]);
+        assert!(!text.contains("The keys are set"), "{text}");
+    }
+}
+
 #[test]
 fn a_shared_store_is_printed_and_credentials_in_its_address_are_never_echoed() {
     let text = printed(

@@ -1,6 +1,7 @@
 //! `planner.warm_start.plan_id`: replaced by that stored plan's waypoints, so that the result depends on the accepted
 //! document alone.
 
+use bytes::Bytes;
 use serde::Deserialize;
 
 use super::AppState;
@@ -13,7 +14,7 @@ use crate::geometry::Point3;
 use crate::geometry::geodesy::LatLon;
 use crate::job::PlanId;
 use crate::scenario::frame::{Datum, Frame};
-use crate::scenario::json::{Fault, MOST_M};
+use crate::scenario::json::{Fault, MAX_LISTED, MOST_M};
 use crate::scenario::{Scenario, WarmStart};
 
 /// The part of a result document that is needed here.
@@ -55,9 +56,47 @@ impl Route {
     }
 }
 
-/// Whether [`resolve`] has anything to do.
-pub(super) fn names_a_plan(scenario: &Scenario) -> bool {
-    matches!(scenario.planner.warm_start, Some(WarmStart::Plan(_)))
+/// Whether a document may name a plan to start from: escapes can hide a field.
+pub(super) fn may_name_a_plan(document: &[u8]) -> bool {
+    str::from_utf8(document).is_ok_and(|text| text.contains('\\') || text.contains("plan_id"))
+}
+
+/// Where a document names the plan that it starts from.
+#[derive(Deserialize)]
+struct Document {
+    planner: Planner,
+}
+
+#[derive(Deserialize)]
+struct Planner {
+    warm_start: Start,
+}
+
+#[derive(Deserialize)]
+struct Start {
+    plan_id: String,
+}
+
+/// The `refusal` of a document, with what is wrong with the plan that it starts from, which only the store knows.
+pub(super) async fn refused_too(
+    state: &AppState,
+    caller: &Caller,
+    document: Bytes,
+    refusal: Problem,
+) -> Problem {
+    let Problem::InvalidScenario(mut faults) = refusal else {
+        return refusal;
+    };
+    if faults.len() < MAX_LISTED && may_name_a_plan(&document) {
+        let named = move || serde_json::from_slice::<Document>(&document);
+        if let Ok(Ok(document)) = off_thread::run(caller, named).await
+            && let Err(Problem::InvalidScenario(more)) =
+                result_named(state, caller, &document.planner.warm_start.plan_id).await
+        {
+            faults.extend(more);
+        }
+    }
+    Problem::InvalidScenario(faults)
 }
 
 /// The result of another plan of the caller, if it has one. The plan may be deleted at any moment.
@@ -68,6 +107,30 @@ async fn result_of(
 ) -> Result<Option<String>, Problem> {
     caller.plan(&*state.store, plan).await?;
     Ok(state.store.result(plan).await?)
+}
+
+/// The plan with this id, and its result.
+///
+/// # Errors
+/// An invalid scenario when it does not exist or has no route yet.
+async fn result_named(
+    state: &AppState,
+    caller: &Caller,
+    id: &str,
+) -> Result<(PlanId, String), Problem> {
+    let unknown = |why| unknown(id, why);
+    let plan = plan_id(id)
+        .ok_or_else(|| unknown("must be the id of a plan, a UUID in lower case with hyphens"))?;
+    match result_of(state, caller, plan).await {
+        Ok(Some(result)) => Ok((plan, result)),
+        Ok(None) => Err(unknown("that plan has no route yet")),
+        Err(Problem::NoSuchPlan(_) | Problem::Gone(_)) => Err(unknown("no plan has this id")),
+        Err(problem) => Err(problem),
+    }
+}
+
+fn unknown(id: &str, why: &str) -> Problem {
+    Problem::InvalidScenario(vec![Fault::unknown_plan(id, why)])
 }
 
 /// Insert the waypoints of the plan that `scenario` starts from.
@@ -82,16 +145,8 @@ pub(super) async fn resolve(
     let Some(WarmStart::Plan(id)) = &scenario.planner.warm_start else {
         return Ok(());
     };
-    let unknown = |why| Problem::InvalidScenario(vec![Fault::unknown_plan(id, why)]);
-    let plan = plan_id(id)
-        .ok_or_else(|| unknown("must be the id of a plan, a UUID in lower case with hyphens"))?;
-    let result = match result_of(state, caller, plan).await {
-        Ok(result) => result.ok_or_else(|| unknown("that plan has no route yet"))?,
-        Err(Problem::NoSuchPlan(_) | Problem::Gone(_)) => {
-            return Err(unknown("no plan has this id"));
-        }
-        Err(problem) => return Err(problem),
-    };
+    let unknown = |why| unknown(id, why);
+    let (plan, result) = result_named(state, caller, id).await?;
     let room = state.answers.room_to_make_one(result.len())?;
     let frame = scenario.frame.clone();
     // A result may be long, and another datum needs the geoid, which takes its time.

@@ -106,6 +106,15 @@ async fn a_warm_start_from_a_plan_without_a_route_is_refused() {
         }
     }
 
+    // All faults are told at once.
+    let mut document = from_plan("01936f2c-7d1a-7c55-9a53-27b1b44c1a10");
+    document["weights"] = json!({"fuel": -1});
+    let answer = api.post("/plans?validate_only=true", &document).await;
+    let problem = answer.expect_problem(422, "invalid-scenario");
+    let errors = problem["errors"].as_array().expect("a list");
+    let pointers: Vec<_> = errors.iter().map(|fault| &fault["pointer"]).collect();
+    assert_eq!(pointers, ["/weights/fuel", "/planner/warm_start/plan_id"]);
+
     // A cancelled plan has the best route so far.
     worker::finish(&*api.store, &lease, Status::Cancelled).await;
     let answer = api.post("/plans", &from_plan(&id_of(&running))).await;

@@ -260,11 +260,10 @@ const SHORT: usize = 4_096;
 
 /// Read a document into a submission. Most are short and name nothing that must be looked up.
 async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Submission, Problem> {
-    if document.len() <= SHORT && !may_name_a_dataset(&document) {
+    let is_quick = document.len() <= SHORT && !may_name_a_dataset(&document);
+    if is_quick && !warm_start::may_name_a_plan(&document) {
         let scenario = json::read(&document, &state.rules, job::draw_seed())?;
-        if !warm_start::names_a_plan(&scenario) {
-            return Ok(submission(scenario, caller.clone(), state.clock.now_ms()));
-        }
+        return Ok(submission(scenario, caller.clone(), state.clock.now_ms()));
     }
     Box::pin(accept_slowly(state, caller, document)).await
 }
@@ -277,7 +276,13 @@ async fn accept_slowly(
 ) -> Result<Submission, Problem> {
     let rules = state.rules.clone();
     let read = move |document: &Bytes| json::read(document, &rules, job::draw_seed());
-    let mut scenario = state.terrains.over(caller, document, read).await??;
+    let read = state.terrains.over(caller, document.clone(), read).await?;
+    let mut scenario = match read {
+        Ok(scenario) => scenario,
+        Err(refusal) => {
+            return Err(warm_start::refused_too(state, caller, document, refusal.into()).await);
+        }
+    };
     warm_start::resolve(state, caller, &mut scenario).await?;
     let (owner, now_ms) = (caller.clone(), state.clock.now_ms());
     off_thread::run(caller, move || submission(scenario, owner, now_ms)).await

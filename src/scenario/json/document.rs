@@ -64,18 +64,18 @@ pub(super) fn document(
     let planner = section(&fields, "planner", &Node::Object(Box::default()), |at| {
         planner(at, &chart, rules, drawn_seed, faults)
     });
-    let max_climb_deg = draft.map(|draft| draft.max_climb_deg);
-    let layout = layout(
-        &fields,
-        dataset.as_ref(),
-        &chart,
+    let ends = ["start", "target"].map(|name| {
+        let end = fields.required(name, faults, |at, faults| chart.point3(at, faults));
+        (name, end)
+    });
+    let flight = Flight {
+        ends,
         altitude,
-        max_climb_deg,
-        rules,
-        faults,
-    );
-    let (layout, mut planner) = (layout?, planner?);
-    let distance = (layout.target - layout.start).norm();
+        max_climb_deg: draft.map(|draft| draft.max_climb_deg),
+    };
+    let layout = layout(&fields, flight, dataset.as_ref(), &chart, rules, faults);
+    let ([(_, start), (_, target)], mut planner) = (ends, planner?);
+    let distance = (target? - start?).norm();
     let limit = rules.limits.path_samples;
     if names_spacing(&fields) {
         check_samples(distance, planner.smoothing.spacing, limit, faults);
@@ -83,6 +83,7 @@ pub(super) fn document(
         // A default spacing must not lead to a refusal: widen it so that the straight line takes half of the limit.
         planner.smoothing.spacing = 2.0 * distance / limit as f64;
     }
+    let layout = layout?;
     Some(Scenario {
         name: name?,
         frame: chart.finish()?,
@@ -112,6 +113,15 @@ fn section<T>(
     })
 }
 
+/// From where to where, and how: what an area that is not given depends on.
+#[derive(Clone, Copy)]
+struct Flight {
+    /// Start and target, with their names.
+    ends: [(&'static str, Option<Point3>); 2],
+    altitude: Option<AltitudeBand>,
+    max_climb_deg: Option<f64>,
+}
+
 /// Everything that has coordinates.
 struct Layout {
     start: Point3,
@@ -123,15 +133,14 @@ struct Layout {
 
 fn layout(
     fields: &Fields<'_>,
+    flight: Flight,
     dataset: Option<&Named<'_>>,
     chart: &Chart,
-    altitude: Option<AltitudeBand>,
-    max_climb_deg: Option<f64>,
     rules: &Rules,
     faults: &mut Faults,
 ) -> Option<Layout> {
-    let start = fields.required("start", faults, |at, faults| chart.point3(at, faults));
-    let target = fields.required("target", faults, |at, faults| chart.point3(at, faults));
+    let Flight { ends, altitude, .. } = flight;
+    let [(_, start), (_, target)] = ends;
     let given_area = chart.area(fields, [start, target], faults);
     let threats = fields.or("threats", Vec::new(), faults, |at, faults| {
         threats(at, chart, &rules.limits, faults)
@@ -143,7 +152,7 @@ fn layout(
         limits: &rules.limits,
         area: given_area.flatten(),
         area_is_given: fields.has("area"),
-        ends: [("start", start), ("target", target)],
+        ends,
     };
     let ground = fields.or("terrain", (terrain::DEFAULT, None), faults, |at, faults| {
         terrain::terrain(at, &site, faults)
@@ -156,7 +165,7 @@ fn layout(
     if let (Some(start), Some(target)) = (start, target) {
         ends::check_apart(start, target, faults);
     }
-    for (name, end) in [("start", start), ("target", target)] {
+    for (name, end) in ends {
         let Some(end) = end else { continue };
         let in_area = given_area
             .flatten()
@@ -177,7 +186,13 @@ fn layout(
     let (start, target, terrain) = (start?, target?, ground?);
     let threats: Vec<Threat> = threats?.into_iter().collect::<Option<_>>()?;
     let area = given_area?.unwrap_or_else(|| {
-        default_area([start, target], altitude, max_climb_deg, &threats, &terrain)
+        default_area(
+            [start, target],
+            altitude,
+            flight.max_climb_deg,
+            &threats,
+            &terrain,
+        )
     });
     Some(Layout {
         start,

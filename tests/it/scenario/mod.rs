@@ -135,6 +135,19 @@ fn every_code_has_a_case_and_a_row_in_the_docs() {
     );
 }
 
+/// The spacing is checked by the distance between the ends, which other faults leave known.
+#[test]
+fn too_fine_a_spacing_is_told_beside_other_faults() {
+    let found = faults(
+        &edited(r#""spacing":5"#, r#""spacing":0.01"#).replace(r#""radius":60"#, r#""radius":-60"#),
+    );
+    let pointers: Vec<_> = found.iter().map(|fault| fault.pointer.as_str()).collect();
+    assert_eq!(
+        pointers,
+        ["/threats/0/radius", "/planner/smoothing/spacing"]
+    );
+}
+
 /// At 300 km apart, samples every 5 m would exceed the limit.
 #[test]
 fn a_default_spacing_is_never_refused() {

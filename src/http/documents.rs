@@ -53,6 +53,7 @@ pub(super) async fn result(
         return Err(Problem::NotReady {
             id,
             status: plan.status,
+            partial,
             retry_after_s,
         });
     }

@@ -60,6 +60,12 @@ fn refuse_other_systems(document: &Value) -> Result<(), ImportError> {
 }
 
 fn feature(draft: &mut Draft, at: &str, value: JsonValue) {
+    if !value.is_object() {
+        return draft.leave(at, "no feature: a feature is an object");
+    }
+    if !matches!(value["geometry"], JsonValue::Null | JsonValue::Object(_)) {
+        return draft.leave(at, "a feature whose geometry is neither an object nor null");
+    }
     let feature = match serde_json::from_value::<Feature>(value) {
         Ok(feature) => feature,
         Err(error) => return draft.leave(at, error.to_string()),

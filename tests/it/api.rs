@@ -647,7 +647,9 @@ async fn a_partial_result_is_measured_like_a_final_one() {
     let api = Api::new();
     let address = api.submit().await;
     let partial = format!("{address}/result?partial=true");
-    api.get(&partial).await.expect_problem(409, "not-ready");
+    let problem = api.get(&partial).await.expect_problem(409, "not-ready");
+    let detail = problem["detail"].as_str().expect("a text");
+    assert!(detail.contains("has no route yet"), "{detail}");
     let lease = api.store.claim().await.expect("a queued plan");
     api.get(&partial).await.expect_problem(409, "not-ready");
 

@@ -344,8 +344,18 @@ async fn webhook_addresses_are_checked_before_a_plan_is_accepted() {
         "",
     ] {
         let refused = submit(&api, url).await;
-        refused.expect_problem(400, "invalid-parameter");
+        let problem = refused.expect_problem(400, "invalid-parameter");
+        let detail = problem["detail"].as_str().expect("a text");
+        assert!(
+            detail.contains("an https address of a public host"),
+            "{detail}"
+        );
     }
+    let private = Api::with_webhooks(settings(true));
+    let refused = submit(&private, "http://user@hooks.example/").await;
+    let problem = refused.expect_problem(400, "invalid-parameter");
+    let detail = problem["detail"].as_str().expect("a text");
+    assert!(detail.contains("an http or https address,"), "{detail}");
     assert_eq!(submit(&api, "https://hooks.example/").await.status, 202);
 }
 

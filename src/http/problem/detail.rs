@@ -121,6 +121,15 @@ impl Problem {
             Self::BodyTooSlow(limit) => {
                 format!("the body was not complete after {} s", limit.as_secs_f64())
             }
+            Self::NotReady {
+                id,
+                status,
+                partial: true,
+                ..
+            } => format!(
+                "plan {id} is {} and has no route yet; GET /plans/{id}/events tells of each",
+                status.name()
+            ),
             Self::NotReady { id, status, .. } => format!(
                 "plan {id} is {}; GET /plans/{id} with Prefer: wait={MAX_WAIT_S} waits for it",
                 status.name()

@@ -135,6 +135,8 @@ pub(super) enum Problem {
         id: PlanId,
         /// Its present status.
         status: Status,
+        /// Whether its best route so far would have done.
+        partial: bool,
         /// When asking again makes sense, seconds.
         retry_after_s: u64,
     },

@@ -19,8 +19,13 @@ pub(in crate::http) struct Target {
 
 impl Target {
     /// The allowed addresses, for a refusal.
-    pub(in crate::http) const ALLOWED: &'static str =
-        "an https address without user or fragment, of at most 2000 characters";
+    pub(in crate::http) fn allowed(private: bool) -> &'static str {
+        if private {
+            "an http or https address, without user or fragment, of at most 2000 characters"
+        } else {
+            "an https address of a public host, without user or fragment, of at most 2000 characters"
+        }
+    }
 
     /// Read an address; plain `http` is accepted only where private receivers are allowed.
     pub(in crate::http) fn read(text: &str, private: bool) -> Option<Self> {

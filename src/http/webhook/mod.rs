@@ -63,8 +63,9 @@ pub(super) fn asked(
     let Some(settings) = settings else {
         return Err(refused("left out: this service sends no webhooks"));
     };
-    if values.next().is_some() || Target::read(&text, settings.allow_private).is_none() {
-        return Err(refused(Target::ALLOWED));
+    let private = settings.allow_private;
+    if values.next().is_some() || Target::read(&text, private).is_none() {
+        return Err(refused(Target::allowed(private)));
     }
     Ok(Some(text))
 }

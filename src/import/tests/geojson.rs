@@ -95,6 +95,24 @@ fn points_circles_and_polygons_of_geojson() {
     assert_eq!(assumed, ["/altitude", "/terrain"]);
 }
 
+#[test]
+fn what_is_no_feature_is_told_in_words_of_the_format() {
+    let mut features = ends();
+    features.extend([json!(null), json!(5), json!(["a"])]);
+    features.push(feature(json!({}), json!("here")));
+    let found = geojson(&features.into()).expect("a scenario");
+    let no_feature = "no feature: a feature is an object";
+    assert_eq!(
+        unused(&found),
+        [
+            format!("/features/2: {no_feature}"),
+            format!("/features/3: {no_feature}"),
+            format!("/features/4: {no_feature}"),
+            "/features/5: a feature whose geometry is neither an object nor null".to_owned(),
+        ]
+    );
+}
+
 /// Also of shapes within shapes, and where the file is one feature.
 #[test]
 fn places_are_pointers_into_the_file() {

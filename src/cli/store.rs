@@ -13,7 +13,7 @@ use crate::store::sqlite::upkeep;
 #[derive(Subcommand)]
 pub(super) enum Command {
     /// Write a compact copy to a new file, even while the service runs; to restore it, put it into an
-    /// empty data directory as noctule.db
+    /// empty data directory as noctule.db, beside a copy of terrains/content and terrains/names
     Backup {
         #[command(flatten)]
         place: Location,

@@ -14,6 +14,9 @@ use crate::geometry::geodesy::LatLon;
 /// WGS 84 as a PROJ string.
 const WGS84: &str = "+proj=longlat +datum=WGS84 +no_defs";
 
+/// Why a code that nobody has heard of cannot be used.
+const UNKNOWN: &str = "its definition is not known";
+
 /// A coordinate reference system.
 #[derive(Clone)]
 pub struct Crs {
@@ -47,19 +50,20 @@ impl Crs {
     /// [`DemError::UnusableCrs`] when the name is not an EPSG code, is unknown, is neither geographic nor projected,
     /// or has no known relation to WGS 84.
     pub fn parse(name: &str) -> Result<Self, DemError> {
-        let code = name.trim().split_once(':').and_then(|(authority, code)| {
-            authority
-                .eq_ignore_ascii_case("EPSG")
-                .then_some(code)?
-                .parse()
-                .ok()
-        });
-        let Some(code) = code else {
-            return Err(DemError::UnusableCrs {
-                crs: name.chars().take(80).collect(),
-                reason: "it must be an EPSG code, such as EPSG:4326".into(),
-            });
+        let unusable = |reason: &str| DemError::UnusableCrs {
+            crs: name.chars().take(80).collect(),
+            reason: reason.into(),
         };
+        let is_number =
+            |code: &&str| !code.is_empty() && code.bytes().all(|at| at.is_ascii_digit());
+        let code = name
+            .trim()
+            .split_once(':')
+            .filter(|(authority, _)| authority.eq_ignore_ascii_case("EPSG"))
+            .map(|(_, code)| code)
+            .filter(is_number)
+            .ok_or_else(|| unusable("it must be an EPSG code, such as EPSG:4326"))?;
+        let code = code.parse().map_err(|_| unusable(UNKNOWN))?;
         Self::epsg(code)
     }
 
@@ -73,7 +77,7 @@ impl Crs {
             reason,
         };
         let definition = crs_definitions::from_code(code)
-            .ok_or_else(|| unusable("its definition is not known".into()))?
+            .ok_or_else(|| unusable(UNKNOWN.into()))?
             .proj4;
         if heights::are_above_ellipsoid(code) {
             return Err(unusable(
@@ -291,6 +295,24 @@ mod tests {
             (lon + 138.648_404_5).abs() < 5e-7 && (lat + 10.480_935_7).abs() < 5e-7,
             "{lon} {lat}"
         );
+    }
+
+    #[test]
+    fn a_name_is_refused_for_its_form_or_for_its_code() {
+        let form = "must be an EPSG code";
+        for (name, reason) in [
+            ("EPSG:1", UNKNOWN),
+            ("EPSG:99999", UNKNOWN),
+            ("EPSG:99999999999999999999", UNKNOWN),
+            ("EPSG:", form),
+            ("EPSG:4326+5773", form),
+            ("4326", form),
+            ("OGC:84", form),
+        ] {
+            let error = Crs::parse(name).expect_err("it is refused").to_string();
+            assert!(error.contains(reason), "{error}");
+        }
+        assert!(Crs::parse(" epsg:4326 ").is_ok());
     }
 
     #[test]

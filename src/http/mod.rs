@@ -23,6 +23,7 @@ mod hosts;
 mod idempotency;
 mod layer;
 mod metrics;
+mod named;
 mod off_thread;
 mod pages;
 mod params;

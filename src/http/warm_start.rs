@@ -6,6 +6,7 @@ use serde::Deserialize;
 
 use super::AppState;
 use super::caller::Caller;
+use super::named::{PLAN, may_name};
 use super::off_thread;
 use super::params::plan_id;
 use super::problem::Problem;
@@ -56,11 +57,6 @@ impl Route {
     }
 }
 
-/// Whether a document may name a plan to start from: escapes can hide a field.
-pub(super) fn may_name_a_plan(document: &[u8]) -> bool {
-    str::from_utf8(document).is_ok_and(|text| text.contains('\\') || text.contains("plan_id"))
-}
-
 /// Where a document names the plan that it starts from.
 #[derive(Deserialize)]
 struct Document {
@@ -87,7 +83,7 @@ pub(super) async fn refused_too(
     let Problem::InvalidScenario(mut faults) = refusal else {
         return refusal;
     };
-    if faults.len() < MAX_LISTED && may_name_a_plan(&document) {
+    if faults.len() < MAX_LISTED && may_name(&document, PLAN) {
         let named = move || serde_json::from_slice::<Document>(&document);
         if let Ok(Ok(document)) = off_thread::run(caller, named).await
             && let Err(Problem::InvalidScenario(more)) =

@@ -16,11 +16,11 @@ use crate::http::auth::Scope;
 use crate::http::body::Announced;
 use crate::http::caller::Caller;
 use crate::http::idempotency::{IDEMPOTENCY_REPLAYED, Once};
+use crate::http::named::{DATASET, PLAN, may_name};
 use crate::http::params::Params;
 use crate::http::prefer::{PREFERENCE_APPLIED, Wait};
 use crate::http::problem::Problem;
 use crate::http::status::{StatusDocument, location};
-use crate::http::terrains::may_name_a_dataset;
 use crate::http::{AppState, Phase, off_thread, retry, warm_start, webhook};
 use crate::job::{self, Idempotency, Plan, Submission};
 use crate::scenario::{Scenario, json};
@@ -260,8 +260,12 @@ const SHORT: usize = 4_096;
 
 /// Read a document into a submission. Most are short and name nothing that must be looked up.
 async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Submission, Problem> {
-    let is_quick = document.len() <= SHORT && !may_name_a_dataset(&document);
-    if is_quick && !warm_start::may_name_a_plan(&document) {
+    let names_nothing = || {
+        ![DATASET, PLAN]
+            .iter()
+            .any(|field| may_name(&document, field))
+    };
+    if document.len() <= SHORT && names_nothing() {
         let scenario = json::read(&document, &state.rules, job::draw_seed())?;
         return Ok(submission(scenario, caller.clone(), state.clock.now_ms()));
     }
@@ -276,8 +280,7 @@ async fn accept_slowly(
 ) -> Result<Submission, Problem> {
     let rules = state.rules.clone();
     let read = move |document: &Bytes| json::read(document, &rules, job::draw_seed());
-    let read = state.terrains.over(caller, document.clone(), read).await?;
-    let mut scenario = match read {
+    let mut scenario = match state.terrains.over(caller, document.clone(), read).await? {
         Ok(scenario) => scenario,
         Err(refusal) => {
             return Err(warm_start::refused_too(state, caller, document, refusal.into()).await);

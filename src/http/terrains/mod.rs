@@ -29,7 +29,7 @@ use super::entity_tags::{EntityTags, opaque};
 use super::off_thread::Places;
 use super::params::{self, NoParams};
 use super::problem::{Busy, Problem};
-use super::{AppState, off_thread};
+use super::{AppState, named, off_thread};
 use crate::catalogue::{Catalogue, CatalogueError, Claim, Entry, Expected, Naming, Tally};
 use crate::digest::sha256_hex;
 use crate::store::DatasetUse;
@@ -104,7 +104,7 @@ impl Terrains {
         document: D,
         work: impl FnOnce(&D) -> T + Send + 'static,
     ) -> Result<T, Problem> {
-        let reads_files = may_name_a_dataset(document.as_ref());
+        let reads_files = named::may_name(document.as_ref(), named::DATASET);
         let work = move || work(&document);
         if reads_files {
             self.read(caller, work).await
@@ -112,11 +112,6 @@ impl Terrains {
             off_thread::run(caller, work).await
         }
     }
-}
-
-/// Whether reading a document may require files: escapes can hide a name. Invalid text is refused before that.
-pub(super) fn may_name_a_dataset(document: &[u8]) -> bool {
-    str::from_utf8(document).is_ok_and(|text| text.contains('\\') || text.contains("dataset"))
 }
 
 /// The `{name}` of the path. An invalid name refers to no dataset.

@@ -304,6 +304,31 @@ fn many_waypoints_over_hills_are_moved_together() {
     assert!(outcome.feasible && gain < 1e-4, "{gain}");
 }
 
+/// Steps are shares of the way from start to target, but a route may begin much farther out.
+#[test]
+fn a_route_far_from_ends_that_are_near_comes_home_in_few_sweeps() {
+    let mut scenario = scenario();
+    scenario.threats.clear();
+    scenario.start = Point3::new(500.0, 500.0, 100.0);
+    scenario.target = Point3::new(502.0, 500.0, 100.0);
+    (scenario.vehicle.min_leg, scenario.vehicle.max_turn_deg) = (0.0, 180.0);
+    let model = Model::new(&scenario);
+    let far = Point3::new(501.0, 900.0, 100.0);
+    let mut route = vec![scenario.start, far, scenario.target];
+    let steps = polish::Steps {
+        from: 0.01,
+        to: 1e-4,
+        gain: 1e-6,
+        violation_m: 0.0,
+    };
+    let mut polish = polish::Polish::new(&model, &Nobody);
+    let best = polish.descend(&mut route, steps);
+    assert!(best.is_feasible() && best.cost < 1.01, "{best:?}");
+    // A sweep prices some eighteen routes; 400 m are 20,000 steps.
+    let priced = polish.evaluations(1);
+    assert!(priced < 20_000, "{priced}");
+}
+
 /// From one side of the area to the other.
 fn wall_across() -> Threat {
     wall([-100.0, 1100.0], [400.0, 450.0])

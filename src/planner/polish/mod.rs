@@ -34,6 +34,9 @@ const HOPE: f64 = 0.12;
 /// by less and less for ever.
 const MENDED: f64 = 1e-3;
 
+/// As many sweeps in a row that all gain show that the step is short for the way that is left to go: then it is doubled.
+const AFOOT: usize = 64;
+
 /// Factor by which a violation becomes more expensive as the step is halved.
 const DEARER: f64 = 8.0;
 
@@ -76,7 +79,7 @@ impl<'m, 's> Polish<'m, 's> {
         let way = (scenario.target - scenario.start).norm();
         let mut best = self.lattice.price(route);
         let mut rate = steps.violation_m * metre(scenario);
-        let (mut step, mut kind, mut failed) = (steps.from * way, 0, 0);
+        let (mut step, mut kind, mut gained, mut failed) = (steps.from * way, 0, 0, 0);
         while step > steps.to * way && why_stop(scenario, self.stop).is_none() {
             let is_last = 0.5 * step <= steps.to * way;
             if is_last || rate <= 0.0 || best.is_feasible() {
@@ -107,7 +110,15 @@ impl<'m, 's> Polish<'m, 's> {
                 }
             }
             kind += 1;
-            failed = if better { 0 } else { failed + 1 };
+            (gained, failed) = if better {
+                (gained + 1, 0)
+            } else {
+                (0, failed + 1)
+            };
+            if gained >= AFOOT {
+                step *= 2.0;
+                gained = 0;
+            }
             if failed >= 2 {
                 let hope = 1.0 + HOPE * step / (steps.from * way);
                 let is_out_of_reach = |(fitness, _): &(Fitness, Vec<Point3>)| {

@@ -170,8 +170,9 @@ fn layout(
         let in_area = given_area
             .flatten()
             .is_none_or(|area| ends::check_area(name, end, area, chart, faults));
+        // Ground with an end may be unknown outside the area, which is the same fault once more.
         if let Some(terrain) = &ground
-            && in_area
+            && (in_area || terrain.extent().is_none())
         {
             ends::check_ground(name, end, terrain, chart, faults);
         }

@@ -366,6 +366,31 @@ fn all_faults_come_at_once_and_in_document_order() {
     insta::assert_snapshot!(Refusal::Invalid(faults).to_string());
 }
 
+/// Unless the ground may end with the area: that would be the same fault twice.
+#[test]
+fn an_end_outside_the_area_is_told_of_the_ground_below_it_as_well() {
+    let codes = |terrain: &str| -> Vec<&'static str> {
+        let document = format!(
+            r#"{{
+                "area": {{"min":{{"x":0,"y":0}},"max":{{"x":100,"y":100}}}},
+                "start": {{"x":-10,"y":50,"z":0}}, "target": {{"x":90,"y":50,"z":60}},
+                "terrain": {terrain}, "altitude": {{"min":0,"max":50}}
+            }}"#
+        );
+        let faults = faults(&document).into_iter();
+        faults.map(|fault| fault.code).collect()
+    };
+    let both = ["outside-area", "below-ground"];
+    assert_eq!(codes(r#"{"kind":"flat","elevation":50}"#), both);
+    assert_eq!(codes(r#"{"kind":"peaks","base":50,"peaks":[]}"#), both);
+    assert_eq!(
+        codes(
+            r#"{"kind":"grid","origin":{"x":0,"y":0},"cell":100,"columns":2,"rows":2,"elevations":[50,50,50,50]}"#
+        ),
+        ["outside-area"]
+    );
+}
+
 /// Whatever needs no frame is checked without one, and whatever all algorithms share without an algorithm.
 #[test]
 fn an_unknown_frame_or_algorithm_hides_no_other_faults() {

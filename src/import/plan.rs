@@ -200,7 +200,7 @@ fn altitude(item: &Value, home: Option<Home>) -> Result<f64, String> {
     let number = || number.ok_or_else(none);
     match item["frame"].as_u64() {
         Some(0 | 5) => number(),
-        _ if is_above_home(item) => Ok(home_altitude(home)? + number()?),
+        _ if is_above_home(item) => Ok(sum(home_altitude(home)?, number()?)),
         Some(frame @ (10 | 11)) => {
             let above_sea = &item["AMSLAltAboveTerrain"];
             above_sea.as_f64().ok_or_else(|| {
@@ -215,6 +215,14 @@ fn altitude(item: &Value, home: Option<Home>) -> Result<f64, String> {
             shown(&item["frame"])
         )),
     }
+}
+
+/// Of two altitudes, metres, without what binary fractions add: 0.1 and 0.2 are 0.3. No file means less than a
+/// micrometre.
+fn sum(one: f64, other: f64) -> f64 {
+    let sum = one + other;
+    let rounded = (sum * 1e6).round() / 1e6;
+    if rounded.is_finite() { rounded } else { sum }
 }
 
 /// The mission's first and last stop; a single stop is the target, reached from home.

@@ -5,6 +5,8 @@ import { calmly } from './dom.js';
 import { tell, untell } from './notice.js';
 
 const VALIDATE_MS = 300;
+/** So long after the service could not be reached, it is asked again. */
+const AGAIN_MS = 3000;
 const UNCHECKED = 'The service cannot be reached: what has changed in the scenario is not checked.';
 const MAY_NOT_PLAN = 'This key may look at plans, but may not plan: the scenario is not checked.';
 
@@ -23,7 +25,10 @@ export function checkAsItChanges(draft, editor, stage) {
     } catch (refusal) {
       if (refusal.status) untell(UNCHECKED);
       if (refusal.problem?.errors) editor.mark(refusal.problem.errors);
-      else if (refusal instanceof Unreachable) tell(UNCHECKED);
+      else if (refusal instanceof Unreachable) {
+        tell(UNCHECKED);
+        setTimeout(() => signal.aborted || check(), AGAIN_MS);
+      }
       else if (refusal.status === 403) tell(MAY_NOT_PLAN, 'note');
       else if (refusal instanceof Said && refusal.status !== 401) tell(refusal.message);
     }

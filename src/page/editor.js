@@ -5,7 +5,7 @@ import { withValue } from './draft.js';
 import { Form } from './form.js';
 import { axes, isGeodetic } from './frame.js';
 import { say } from './notice.js';
-import { threatName } from './words.js';
+import { faultText, threatName } from './words.js';
 
 const PAGE = 20;
 /** Of faults at most so many are listed. */
@@ -24,7 +24,10 @@ export class Editor {
     this.draft = draft;
     this.acts = acts;
     this.form = new Form(root, draft);
-    draft.addEventListener('change', () => this.show());
+    draft.addEventListener('change', ({ detail: { why } }) => {
+      // What another document leaves open, the service has yet to say.
+      this.show(why === 'edited' || why === 'stepped' ? undefined : null);
+    });
   }
 
   /** Which shipped scenario the draft began with; '' for none. */
@@ -63,7 +66,7 @@ export class Editor {
   /** The service's faults; none where the document is right. */
   mark(faults) {
     if (faults.length !== this.#faults.length) {
-      say(faults.length === 0 ? 'Nothing is left to mend.' : faults.length === 1 ? `One thing to mend: ${faults[0].detail}` : `${faults.length} things to mend.`);
+      say(faults.length === 0 ? 'Nothing is left to mend.' : faults.length === 1 ? `One thing to mend: ${faultText(faults[0], this.draft.document)}` : `${faults.length} things to mend.`);
     }
     this.#faults = faults;
     this.form.mark(faults);
@@ -73,7 +76,7 @@ export class Editor {
     list.replaceChildren(
       el('h2', {}, faults.length === 1 ? 'One thing to mend' : `${faults.length} things to mend`),
       el('ul', {}, faults.slice(0, MOST_FAULTS).map((fault) =>
-        el('li', {}, el('button', { type: 'button', class: 'link', onclick: () => this.goTo(fault.pointer) }, fault.detail))),
+        el('li', {}, el('button', { type: 'button', class: 'link', onclick: () => this.goTo(fault.pointer) }, faultText(fault, this.draft.document)))),
       faults.length > MOST_FAULTS && el('li', {}, `and ${faults.length - MOST_FAULTS} more`)),
     );
   }

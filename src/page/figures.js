@@ -46,7 +46,7 @@ function offer(id, yes) {
 function told({ status, result: end }, best) {
   if (end && !end.feasible) return 'cost of a route that must not be flown';
   if (best !== null && best !== undefined) return 'cost of the best route';
-  if (status?.status !== 'queued') return 'no feasible route yet';
+  if (status?.status !== 'queued') return status?.finished_at ? 'no feasible route' : 'no feasible route yet';
   return status.queue_position ? `waiting, number ${status.queue_position} in the queue` : 'waiting';
 }
 

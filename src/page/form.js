@@ -87,7 +87,7 @@ export class Form {
     for (const { pointer, input, show, write } of this.#fields) {
       const value = at(this.draft.document, pointer);
       show(value);
-      if (write && input.tagName !== 'SELECT') input.placeholder = write(defaults ? at(defaults, pointer) : undefined) || '–';
+      if (write && input.tagName !== 'SELECT') input.placeholder = write(brief(defaults ? at(defaults, pointer) : undefined)) || '–';
     }
     this.mark(this.#faults);
   }
@@ -132,4 +132,9 @@ export class Form {
     const find = (test) => this.#fields.find((field) => field.fault && test(field.pointer));
     return find((own) => own === pointer) ?? find((own) => own.startsWith(`${pointer}/`)) ?? null;
   }
+}
+
+/** A default to be read, not to be copied. */
+function brief(value) {
+  return Number.isFinite(value) && !Number.isInteger(value) ? Number(value.toPrecision(6)) : value;
 }

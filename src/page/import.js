@@ -18,6 +18,7 @@ export async function readFile(file) {
     } catch (error) {
       throw new Said(`${file.name} is no JSON: ${error.message}`);
     }
+    if (document?.engine_version && document?.waypoints) throw new Said(`${file.name} is a result, not a scenario: what can be opened is the Scenario, JSON beside it.`);
     if (document?.start || document?.target || document?.threats) {
       const wrong = misshapen(document);
       if (wrong) throw new Said(`${file.name} is no scenario: ${wrong}.`);

@@ -29,7 +29,7 @@ import { turn } from './tabs.js';
 import { Tools } from './tools.js';
 import { onUndoKeys } from './undo.js';
 import { guard, isKept, keep } from './unsaved.js';
-import { metres, number } from './words.js';
+import { faultText, metres, number } from './words.js';
 
 const EMPTY = {
   name: 'untitled', frame: 'local', start: { x: 100, y: 100, z: 50 }, target: { x: 900, y: 900, z: 50 },
@@ -191,7 +191,7 @@ async function submit(warm) {
     turn('scenario');
     editor.mark(faults);
     editor.goTo(faults[0].pointer);
-    throw new Said(`This cannot be planned yet: ${faults.length === 1 ? 'one thing is' : `${faults.length} things are`} to mend. ${faults[0].detail}`);
+    throw new Said(`This cannot be planned yet: ${faults.length === 1 ? 'one thing is' : `${faults.length} things are`} to mend. ${faultText(faults[0], draft.document)}`);
   } finally {
     occupied(false);
   }

@@ -81,6 +81,8 @@ export class Strip {
     pen.font = '11px ui-sans-serif, system-ui, sans-serif';
     if (!scales || scales.wide < 40) {
       pen.fillStyle = colours.faint;
+      pen.textAlign = 'left';
+      pen.textBaseline = 'middle';
       pen.fillText('The profile of the route appears here once there is one.', EDGE.left, canvas.clientHeight / 2);
       return;
     }

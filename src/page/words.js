@@ -45,5 +45,12 @@ export function step(span, parts) {
   return (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10) * power;
 }
 
+/** What is wrong with a scenario, and with which of its ends or threats. */
+export function faultText({ pointer, detail }, document) {
+  const [, end, index] = pointer.match(/^\/(start|target|threats\/(\d+))\/./) ?? [];
+  if (!end) return detail;
+  return `${index === undefined ? end : threatName(document.threats?.[index], index)}: ${detail}`;
+}
+
 /** A threat's name, or its number. */
 export const threatName = (threat, at) => threat?.name || `threat ${at}`;

@@ -1,6 +1,8 @@
 //! The same search with a few waypoints fewer, and with a few more. Over hills where the limits of a vehicle that turns in
-//! wide bows are felt, and over level ground where waypoints are scarce, they decide which ways are seen at all, and the
-//! best of those seen with another number may be better with this one too.
+//! wide bows are felt or where the route circles, and over level ground where waypoints are scarce, they decide which ways
+//! are seen at all, and the best of those seen with another number may be better with this one too.
+
+use std::f64::consts::TAU;
 
 use super::aside::aside_with;
 use super::backwards::WIDE_TURNS_DEG;
@@ -8,7 +10,8 @@ use super::doubt::is_doubtful;
 use super::finish::finish_from;
 use super::log::Log;
 use super::{StopReason, is_from_scratch, newton, starts};
-use crate::cost::Model;
+use crate::cost::{Model, turns};
+use crate::geometry::Point3;
 
 /// The numbers of waypoints, as shares of the requested one.
 const SHARES: [f64; 2] = [0.8, 1.2];
@@ -24,12 +27,19 @@ pub(super) fn is_worthwhile(model: &Model, lower: f64, log: &Log) -> bool {
         } else {
             model.scenario.vehicle.max_turn_deg <= WIDE_TURNS_DEG
                 && newton::is_felt(model, &log.route)
+                || circles(&log.route)
         }
     };
     is_from_scratch(model.scenario)
         && model.scenario.planner.waypoints <= MOST
         && log.best.is_feasible()
         && are_ways_missed()
+}
+
+/// Whether a route turns as much as a full circle does. Circles above a summit, say, are made of few waypoints each, and
+/// how many are left for the rest decides how well they follow the ground.
+fn circles(route: &[Point3]) -> bool {
+    turns(route).map(f64::abs).sum::<f64>() >= TAU
 }
 
 /// Search with other numbers of waypoints, and keep what comes of the routes found if it is better.
@@ -82,7 +92,6 @@ fn numbers(waypoints: usize) -> impl Iterator<Item = usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point3;
     use crate::planner::tests::{Looks, disc, mountain, peaks, scenario};
     use crate::planner::{Nobody, plan};
     use crate::scenario::{AltitudeBand, Scenario, Seeding, WarmStart};
@@ -134,6 +143,31 @@ mod tests {
         for (waypoints, expected) in expected {
             assert_eq!(numbers(waypoints).collect::<Vec<_>>(), expected);
         }
+    }
+
+    /// With sixteen waypoints alone, the best found costs 792.6: it circles high above the mountain.
+    #[test]
+    fn a_descent_in_circles_is_searched_with_other_numbers_of_waypoints() {
+        let mut scenario = scenario();
+        scenario.threats.clear();
+        scenario.terrain = peaks(0.0, &[[200.0, 500.0, 401.0, 138.0, 138.0]]);
+        scenario.start = Point3::new(200.0, 500.0, 401.0);
+        scenario.target = Point3::new(900.0, 500.0, 1.0);
+        scenario.area.max.x = 1100.0;
+        scenario.altitude = AltitudeBand {
+            min: 20.0,
+            max: 120.0,
+        };
+        scenario.vehicle.max_climb_deg = 20.0;
+        scenario.vehicle.min_leg = (scenario.target - scenario.start).norm() / 170.0;
+        scenario.planner.seeding = Seeding::Tangent;
+        scenario.planner.polish = true;
+        scenario.planner.waypoints = 16;
+        (scenario.planner.population, scenario.planner.iterations) = (30, 30);
+        scenario.planner.seed = 2;
+        let outcome = plan(&scenario, &mut Nobody, &Nobody);
+        assert!(outcome.feasible && circles(&outcome.waypoints));
+        assert!(outcome.cost.total < 765.0, "{}", outcome.cost.total);
     }
 
     /// With ten waypoints alone, the best found costs 530.

@@ -70,7 +70,7 @@ test('fields say whose they are, and their faults are said once', async () => {
   await fill(page, '/threats/1/radius', '-3');
   await page.waitForSelector('[data-pointer="/threats/1/radius"][aria-invalid=true]');
   assert.equal(await group.getByRole('textbox', { name: 'Core radius m', exact: true }).inputValue(), '-3');
-  assert.match(await page.textContent('#said'), /One thing to mend: radius is -3/);
+  assert.match(await page.textContent('#said'), /One thing to mend: mast: radius is -3/);
   await fill(page, '/threats/1/radius', '60');
   await page.waitForFunction(() => /Nothing is left to mend/.test(document.getElementById('said').textContent));
   await page.done();

@@ -135,6 +135,19 @@ fn ends_above_terrain_are_at_their_altitude_above_sea() {
     }
 }
 
+#[test]
+fn heights_above_home_are_summed_as_decimals() {
+    let item = |lat: f64, height: f64| json!({"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, null, lat, 8.5, height]});
+    let plan = json!({"fileType": "Plan", "mission": {
+        "plannedHomePosition": [47.2, 8.5, 0.1], "items": [item(47.3, 0.2), item(47.4, 1e300)],
+    }});
+    let scenario = convert(plan.to_string().as_bytes(), Syntax::Json)
+        .expect("a scenario")
+        .scenario;
+    assert_eq!(scenario["start"]["alt"], json!(0.3));
+    assert_eq!(scenario["target"]["alt"], json!(1e300));
+}
+
 /// Whatever counts from an unknown home is not known either.
 #[test]
 fn ends_that_count_from_home_need_its_altitude() {

@@ -35,14 +35,14 @@ function verdict(result, scenario, acts) {
     const facts = [
       ['Length', metres(result.path?.length ?? result.legs.reduce((sum, leg) => sum + leg.length, 0))],
       ['Duration', duration(result.path?.duration_s)],
-      ['Above ground away from the ends', held.min_agl === null ? 'climbs and descents only' : `${number(held.min_agl)} to ${number(held.max_agl)} m`],
+      ['Above ground', held.min_agl === null ? 'climbs and descents only' : `${number(held.min_agl)} to ${number(held.max_agl)} m`],
       ['Sharpest turn', `${number(checks.waypoints.max_turn_deg)}°`],
       ['Steepest climb', `${number(held.max_climb_deg)}°`],
       ['Proven gap', share(bound.gap)],
     ];
     return el('section', { class: 'verdict good', 'aria-labelledby': 'verdict-head' },
       el('h2', { id: 'verdict-head' }, 'The route holds'),
-      el('p', {}, stopped(result), ' ', bound.gap === null ? 'No bound could be proven.' : `No route of straight legs can be more than ${share(1 - 1 / (1 + bound.gap))} cheaper; that is proven.`),
+      el('p', {}, stopped(result), ' ', bound.gap === null ? 'No bound could be proven.' : `No route of straight legs can be more than ${share(1 - 1 / (1 + bound.gap))} cheaper; that is proven.`, ' Near start and target the route may climb or descend outside the band; its height above ground is given for the rest.'),
       el('dl', { class: 'facts' }, facts.map(([name, value]) => el('div', {}, el('dt', {}, name), el('dd', {}, value)))));
   }
   return el('section', { class: 'verdict bad', 'aria-labelledby': 'verdict-head' },

@@ -60,7 +60,22 @@ test('a file that is no scenario is refused in words, and leaves the page as it 
     await page.waitForFunction(() => /wrong.json is no scenario: its [a-z ]+ must be/.test(document.getElementById('notice').textContent));
     await page.click('#notice [aria-label=Dismiss]');
   }
+  await drop(page, 'result.json', JSON.stringify({ engine_version: '0.1.0', waypoints: [start, target] }), 'application/json');
+  await page.waitForFunction(() => /result.json is a result, not a scenario/.test(document.getElementById('notice').textContent));
   assert.deepEqual(await document_(page), before_);
+  await page.done();
+});
+
+test('what a scenario leaves open is not taken from the one before', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  const hint = (pointer) => page.getAttribute(`[data-pointer="${pointer}"]`, 'placeholder');
+  await page.waitForFunction(() => /^\d+\.?\d{0,5}$/.test(document.querySelector('[data-pointer="/vehicle/min_leg"]').placeholder));
+  const { start, target } = SMALL;
+  const bare = { start, target, threats: [{ kind: 'cylinder', center: { x: 500, y: 500 } }] };
+  await drop(page, 'bare.json', JSON.stringify(bare), 'application/json');
+  await page.waitForSelector('[data-pointer="/altitude/min"][aria-invalid=true]');
+  for (const pointer of ['/altitude/min', '/threats/0/radius', '/vehicle/min_leg']) assert.equal(await hint(pointer), '–', pointer);
   await page.done();
 });
 

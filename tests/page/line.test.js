@@ -94,5 +94,12 @@ test('an edit that cannot be checked says so, until one can', async () => {
   there = true;
   await fill(page, '/name', 'two');
   await page.waitForSelector('#notice', { state: 'hidden' });
+  there = false;
+  await fill(page, '/threats/0/radius', '-3');
+  await page.waitForFunction(() => /not checked/.test(document.getElementById('notice').textContent));
+  there = true;
+  // Without another change.
+  await page.waitForSelector('[data-pointer="/threats/0/radius"][aria-invalid=true]');
+  await page.waitForSelector('#notice', { state: 'hidden' });
   await page.done();
 });

@@ -15,8 +15,11 @@ use super::throttle::Throttle;
 use crate::job::{Event, NumberedEvent, PlanId, Status};
 use crate::store::{LastEvent, Store, StoreError};
 
-/// Events read at once.
+/// Events read at once, at most.
 const PAGE: usize = 128;
+
+/// Events read first, since they may be long: not many more than are given out at once.
+const FIRST_PAGE: usize = 8;
 
 /// About so many bytes of them are given out at once, or one event: whoever takes nothing holds this much memory.
 const PAGE_BYTES: usize = 32 * 1024;
@@ -64,8 +67,10 @@ pub(super) struct Feed {
     last_sent: Instant,
     /// Whether the reader has been given everything that the store had when last read.
     caught_up: bool,
-    /// Events to ask the store for: fewer where not all of them could be given out, since long ones would be read again
-    /// and again.
+    /// Whether it began at the first event and has not reached the newest.
+    is_new: bool,
+    /// Events to ask the store for: twice as many as could be given out last, since long ones would be read again and
+    /// again.
     page: usize,
     /// Events that may still be read once the service stops.
     last_events: usize,
@@ -87,12 +92,13 @@ impl Feed {
             store,
             id,
             after,
+            is_new: after == 0,
             throttle: Throttle::new(rate_hz),
             phase,
             held_since: None,
             last_sent: Instant::now(),
             caught_up: false,
-            page: PAGE,
+            page: FIRST_PAGE,
             last_events: LAST_EVENTS,
             over: false,
         }
@@ -147,12 +153,13 @@ impl Feed {
         let mut events = page.events;
         self.caught_up = events.is_empty();
         let read = events.len();
-        if self.after == 0 && read < self.page {
+        if read < self.page && std::mem::take(&mut self.is_new) {
             self.show_place_in_queue(&mut events).await;
         }
         shorten(&mut events);
-        let given = events.len();
-        self.page = if given < read { 2 * given } else { PAGE };
+        if events.len() < read || read == self.page {
+            self.page = (2 * events.len()).min(PAGE);
+        }
         Ok(events)
     }
 
@@ -305,21 +312,11 @@ impl Feed {
 fn shorten(page: &mut Vec<NumberedEvent>) {
     let mut bytes = 0;
     let within = page.iter().take_while(|numbered| {
-        bytes += size(&numbered.event);
+        bytes += numbered.event.bytes();
         bytes <= PAGE_BYTES
     });
     let count = within.count();
     page.truncate(count.max(1));
-}
-
-/// About how many bytes an event takes on the wire.
-fn size(event: &Event) -> usize {
-    const FIGURES: usize = 200;
-    const WAYPOINT: usize = 70;
-    match event {
-        Event::Incumbent(incumbent) => FIGURES + WAYPOINT * incumbent.waypoints.len(),
-        Event::Status(_) | Event::Convergence(_) | Event::End(_) => FIGURES,
-    }
 }
 
 /// When to wake for a reader to whom something was last sent at `last_sent`: to release what the throttle holds when its

@@ -19,6 +19,21 @@ pub enum Event {
     End(Status),
 }
 
+impl Event {
+    /// About how many bytes it takes as JSON.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        const FIGURES: usize = 256;
+        const RECORD: usize = 1024;
+        const WAYPOINT: usize = 70;
+        match self {
+            Self::Incumbent(route) => FIGURES + WAYPOINT * route.waypoints.len(),
+            Self::Status(_) => RECORD,
+            Self::Convergence(_) | Self::End(_) => FIGURES,
+        }
+    }
+}
+
 /// An event with its number in its plan's own sequence, which grows from 1 and may have gaps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NumberedEvent {

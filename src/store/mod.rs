@@ -11,6 +11,7 @@ pub mod jetstream;
 mod lost;
 pub mod measured;
 mod options;
+mod parts;
 mod pause;
 pub mod reopening;
 pub mod sqlite;

@@ -11,8 +11,8 @@ use crate::store::EventPage;
 /// Approximate bytes of events in memory.
 const ROOM: usize = 64 << 20;
 
-/// Bytes assumed for an event that is not a route.
-const SMALL_EVENT: usize = 256;
+/// Bytes assumed for a step beside its events.
+const STEP: usize = 256;
 
 /// The events of one step.
 #[derive(Debug, Clone)]
@@ -73,7 +73,7 @@ impl History {
         if let Some(route) = route {
             self.incumbent = Some((record.attempt, route));
         }
-        let bytes = SMALL_EVENT + events.iter().map(|one| bytes_of(&one.event)).sum::<usize>();
+        let bytes = STEP + events.iter().map(|one| one.event.bytes()).sum::<usize>();
         self.bytes += bytes;
         self.batches.push_back(Batch {
             last: record.last_event,
@@ -120,15 +120,6 @@ impl History {
     pub(super) fn incumbent(&self, attempt: u64) -> Option<Incumbent> {
         let (under, route) = self.incumbent.as_ref()?;
         (*under == attempt).then(|| route.clone())
-    }
-}
-
-/// Approximate bytes in memory, and an upper bound on bytes in a message.
-pub(super) fn bytes_of(event: &Event) -> usize {
-    match event {
-        Event::Incumbent(route) => SMALL_EVENT + 64 * route.waypoints.len(),
-        Event::Status(_) => 4 * SMALL_EVENT,
-        Event::Convergence(_) | Event::End(_) => SMALL_EVENT,
     }
 }
 
@@ -293,7 +284,7 @@ mod tests {
     fn the_oldest_unread_histories_are_evicted() {
         let mut histories = Histories::new(u64::MAX);
         let step = &steps(1)[0];
-        let count = ROOM / (2 * SMALL_EVENT) + 10;
+        let count = ROOM / (2 * STEP) + 10;
         for nth in 0..count as u128 {
             histories.push(Uuid::from_u128(nth), step);
         }

@@ -6,19 +6,13 @@ use async_nats::jetstream::AckKind;
 
 use super::JetStream;
 use super::claim::answer;
-use super::history::bytes_of;
 use super::record::{Document, Record, State, length};
 use super::run_steps::{Appended, RunSteps};
 use super::steps::Change;
 use super::view::Standing;
 use crate::job::{Event, Plan, PlanId, Status};
+use crate::store::parts::parts;
 use crate::store::{End, Ending, StoreError, expected, pause_after};
-
-/// Maximum number of events in one step.
-const EVENTS: usize = 256;
-
-/// Approximate bytes of events in one step; servers accept messages of 1 MiB by default.
-const BYTES: usize = 256 << 10;
 
 impl JetStream {
     pub(super) async fn append(
@@ -297,58 +291,5 @@ fn lost(error: StoreError, id: PlanId) -> StoreError {
     match error {
         StoreError::NotFound(_) | StoreError::Gone(_) => StoreError::LeaseLost(id),
         other => other,
-    }
-}
-
-/// Split the events so that each part fits in a step.
-fn parts(events: &[Event]) -> Vec<&[Event]> {
-    let mut parts = Vec::new();
-    let mut rest = events;
-    while !rest.is_empty() {
-        let mut bytes = 0;
-        let fits = |event: &&Event| {
-            bytes += bytes_of(event);
-            bytes <= BYTES
-        };
-        let count = rest.iter().take(EVENTS).take_while(fits).count().max(1);
-        let (part, more) = rest.split_at(count);
-        parts.push(part);
-        rest = more;
-    }
-    parts
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::export::document::{Incumbent, Position};
-
-    fn incumbent(waypoints: usize) -> Event {
-        let place = Position::Local {
-            x: -1.234_567_890_123_456_7e-300,
-            y: -1.234_567_890_123_456_7e-300,
-            z: -1.234_567_890_123_456_7e-300,
-        };
-        Event::Incumbent(Incumbent {
-            iteration: 1,
-            elapsed_ms: 1.0,
-            cost: 1.0,
-            feasible: false,
-            waypoints: vec![place; waypoints],
-        })
-    }
-
-    #[test]
-    fn parts_are_complete_in_order_and_fit_into_messages() {
-        for (events, waypoints) in [(0, 3), (1, 3), (600, 3), (40, 200), (3, 20_000)] {
-            let all = vec![incumbent(waypoints); events];
-            let parts = parts(&all);
-            assert_eq!(parts.concat(), all);
-            for part in parts {
-                let bytes = serde_json::to_vec(part).expect("they can be written").len();
-                assert!(bytes <= 1 << 20 || part.len() == 1, "{bytes}");
-                assert!(part.len() <= EVENTS);
-            }
-        }
     }
 }

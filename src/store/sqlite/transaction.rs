@@ -7,10 +7,8 @@ use super::packed;
 use super::postponed::Postponed;
 use super::row::PlanRow;
 use crate::job::{Event, Plan, PlanId};
+use crate::store::parts::parts;
 use crate::store::{Options, StoreError};
-
-/// Events in a row of the table, at most.
-const BATCH: usize = 256;
 
 /// An open transaction and its state so far.
 pub(super) struct Transaction<'a> {
@@ -87,7 +85,7 @@ impl Transaction<'_> {
         row: &mut PlanRow,
         events: &[Event],
     ) -> Result<(), StoreError> {
-        for batch in events.chunks(BATCH) {
+        for batch in parts(events) {
             let batch = Batch::of(row, batch)?;
             self.keep(row, &batch)?;
         }

@@ -2,7 +2,7 @@
 
 import { Said, Unreachable, ask } from './api.js';
 import { calmly } from './dom.js';
-import { tell, untell } from './notice.js';
+import { hold, over, tell } from './notice.js';
 
 const VALIDATE_MS = 300;
 /** So long after the service could not be reached, it is asked again. */
@@ -18,18 +18,18 @@ export function checkAsItChanges(draft, editor, stage) {
     const { signal } = checking;
     try {
       const { scenario } = await ask('/plans?validate_only=true', { method: 'POST', body: draft.document, signal, quiet: true });
-      untell(UNCHECKED);
+      [UNCHECKED, MAY_NOT_PLAN].forEach(over);
       editor.mark([]);
       editor.show(scenario);
       await stage.sample(scenario, signal);
     } catch (refusal) {
-      if (refusal.status) untell(UNCHECKED);
+      if (refusal.status) over(UNCHECKED);
       if (refusal.problem?.errors) editor.mark(refusal.problem.errors);
       else if (refusal instanceof Unreachable) {
-        tell(UNCHECKED);
+        hold(UNCHECKED, 'bad');
         setTimeout(() => signal.aborted || check(), AGAIN_MS);
       }
-      else if (refusal.status === 403) tell(MAY_NOT_PLAN, 'note');
+      else if (refusal.status === 403) hold(MAY_NOT_PLAN, 'note');
       else if (refusal instanceof Said && refusal.status !== 401) tell(refusal.message);
     }
   });

@@ -11,6 +11,8 @@ const PAGE = 20;
 /** Of faults at most so many are listed. */
 const MOST_FAULTS = 12;
 
+const KINDS = { cylinder: 'Cylinder', polygon: 'Polygon' };
+
 export class Editor {
   #shape = '';
   #page = 0;
@@ -211,7 +213,7 @@ export class Editor {
         this.form.number(`${pointer}/radius`, 'Core radius', 'm'), this.form.number(`${pointer}/influence`, 'Soft radius', 'm'), limits[1])];
     return el('li', { class: 'threat', data: { index }, value: index, onfocusin: () => this.acts.select(index) },
       el('div', { class: 'parts', role: 'group' },
-        el('div', { class: 'head' }, this.form.text(`${pointer}/name`, `${index}. ${threat.kind === 'polygon' ? 'Polygon' : 'Cylinder'}`, { empty: null }), remove), ...body));
+        el('div', { class: 'head' }, this.form.text(`${pointer}/name`, `${index}. ${KINDS[threat.kind] ?? 'Threat'}`, { empty: null }), remove), ...body));
   }
 
   #ground(document) {

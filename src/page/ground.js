@@ -2,6 +2,7 @@
 
 import { axes } from './frame.js';
 import { drawnBySoftware } from './graphics.js';
+import { finite, radiiOf } from './sizes.js';
 
 /** Nodes of drawn ground along its longer side, at most. */
 const FINEST = drawnBySoftware() ? 121 : 301;
@@ -40,8 +41,8 @@ export function extentOf(document, frame) {
   add(document.start);
   add(document.target);
   for (const threat of document.threats ?? []) {
-    if (threat.kind === 'polygon') threat.vertices?.forEach((vertex) => add(vertex, threat.margin ?? 0));
-    else add(threat.center, threat.influence ?? threat.radius ?? 0);
+    if (threat.kind === 'polygon') threat.vertices?.forEach((vertex) => add(vertex, finite(threat.margin)));
+    else add(threat.center, radiiOf(threat).influence);
   }
   return boxOf(places.length ? places : [{ x: -500, y: -500 }, { x: 500, y: 500 }], 0.12);
 }
@@ -54,14 +55,15 @@ function boxOf(places, margin) {
 }
 
 function flat({ elevation = 0 }, document, frame) {
-  const height = Number.isFinite(elevation) ? elevation : 0;
+  const height = finite(elevation);
   return { extent: extentOf(document, frame), at: () => height, least: height, greatest: height, mesh: null };
 }
 
 function peaks({ base = 0, peaks: all }, document, frame) {
-  const bells = all.map(({ center, height, spread }) => ({ ...frame.to(center), height, sx: spread.x, sy: spread.y }));
+  const bells = all.map(({ center, height, spread }) => ({ ...frame.to(center), height, sx: spread.x, sy: spread.y }))
+    .filter(({ x, y, height, sx, sy }) => [x, y, height, sx, sy].every(Number.isFinite) && sx && sy);
   const at = (x, y) =>
-    bells.reduce((sum, bell) => sum + bell.height * Math.exp(-(((x - bell.x) / bell.sx) ** 2) - ((y - bell.y) / bell.sy) ** 2), base);
+    bells.reduce((sum, bell) => sum + bell.height * Math.exp(-(((x - bell.x) / bell.sx) ** 2) - ((y - bell.y) / bell.sy) ** 2), finite(base));
   const extent = extentOf(document, frame);
   const [wide, high] = [extent.max.x - extent.min.x, extent.max.y - extent.min.y];
   const cell = Math.max(wide, high) / (PEAKS_NODES - 1);
@@ -74,7 +76,7 @@ function peaks({ base = 0, peaks: all }, document, frame) {
 }
 
 function grid({ origin, cell, columns, rows, elevations }, document, frame) {
-  if (!(columns >= 2 && rows >= 2 && cell > 0) || elevations.length !== columns * rows) return null;
+  if (!(columns >= 2 && rows >= 2 && cell > 0) || elevations.length !== columns * rows || !elevations.every(Number.isFinite)) return null;
   const corner = frame.to(origin);
   const at = bilinear(columns, rows, elevations, (x, y) => [(x - corner.x) / cell, (y - corner.y) / cell]);
   const stride = Math.ceil((Math.max(columns, rows) - 1) / (FINEST - 1));

@@ -6,6 +6,7 @@ import { threatName } from './words.js';
 /** So many places are named for a reason, and so many reasons given: the rest is counted. */
 const NAMED = 3;
 const REASONS = 5;
+const CAN_BE_OPENED = 'What can be opened: scenarios in JSON, GeoJSON, KML, and plans of QGroundControl.';
 
 /** The document in a file, and what there is to say about it. */
 export async function readFile(file) {
@@ -16,7 +17,7 @@ export async function readFile(file) {
     try {
       document = JSON.parse(text);
     } catch (error) {
-      throw new Said(`${file.name} is no JSON: ${error.message}`);
+      throw new Said(`${file.name} is no JSON: ${error.message}. ${CAN_BE_OPENED}`);
     }
     if (document?.engine_version && document?.waypoints) throw new Said(`${file.name} is a result, not a scenario: what can be opened is the Scenario, JSON beside it.`);
     if (document?.start || document?.target || document?.threats) {
@@ -26,7 +27,9 @@ export async function readFile(file) {
     }
   }
   const type = kml ? 'application/vnd.google-earth.kml+xml' : 'application/json';
-  const { scenario, assumed, unused } = await ask('/scenarios:convert', { method: 'POST', body: text, type });
+  const { scenario, assumed, unused } = await ask('/scenarios:convert', { method: 'POST', body: text, type }).catch((refusal) => {
+    throw refusal.status === 422 ? new Said(`${file.name} holds no scenario: ${refusal.message}. ${CAN_BE_OPENED}`) : refusal;
+  });
   const notes = [
     ['Taken for granted', grouped(assumed.map(({ pointer, reason }) => [fieldName(pointer, scenario), reason]))],
     ['Not used', grouped(unused.map(({ where, reason }) => [where, reason]))],

@@ -15,7 +15,7 @@ import { axes, isGeodetic, written } from './frame.js';
 import { readFile } from './import.js';
 import { askForKey } from './key.js';
 import { keepOrder } from './narrow.js';
-import { attempt, say, tell, untell } from './notice.js';
+import { attempt, hold, over, say, tell } from './notice.js';
 import { OTHERS, onSchemeChange, palette } from './palette.js';
 import { Plans } from './plans.js';
 import { onPrint } from './print.js';
@@ -188,6 +188,8 @@ async function submit(warm) {
   } catch (error) {
     const faults = error.problem?.errors;
     if (!faults) throw error;
+    const before = faults.find(({ pointer }) => pointer.startsWith('/planner/warm_start'));
+    if (before) throw new Said(`There is no route to begin with: ${before.detail}. Plan begins without one.`);
     turn('scenario');
     editor.mark(faults);
     editor.goTo(faults[0].pointer);
@@ -217,6 +219,7 @@ function show(plan) {
   stage.front(plan);
   again.offer(plan);
   plan?.addEventListener('news', ({ detail }) => plan === stage.plan && heard(plan, detail));
+  over(LOST);
   if (plan) for (const what of ['status', 'search']) heard(plan, what);
   else {
     by('stale').hidden = true;
@@ -241,8 +244,10 @@ function heard(plan, what) {
   if (what === 'end' || what === 'status') result(plan);
   if (what === 'end' || what === 'history') again.offer(plan);
   if (what === 'connection') {
-    if (plan.connected) untell(LOST);
-    else tell(plan.lostBecause ?? LOST, 'note');
+    const lost = !plan.connected && !plan.lostBecause;
+    if (lost) hold(LOST, 'note');
+    else over(LOST);
+    if (plan.lostBecause) tell(plan.lostBecause, 'note');
     if (plan.connected) say('Connected again.');
   }
   if (what === 'status' && plan.status?.status === 'running' && running !== plan) {

@@ -2,6 +2,7 @@
 
 import { el } from './dom.js';
 import { axes, written } from './frame.js';
+import { radiiOf } from './sizes.js';
 
 const NEAR_PX = 13;
 /** A finger covers what it is at. */
@@ -88,15 +89,15 @@ export class Tools {
         ...document,
         threats: document.threats.map((one, k) => {
           if (k !== stage.selected) return one;
-          const influence = one.influence ?? one.radius;
-          return name === 'radius' ? { ...one, radius: metres, influence: Math.max(metres, influence) } : { ...one, influence: Math.max(metres, one.radius) };
+          const { radius, influence } = radiiOf(one);
+          return name === 'radius' ? { ...one, radius: metres, influence: Math.max(metres, influence) } : { ...one, influence: Math.max(metres, radius) };
         }),
       }), this.#gesture());
     };
-    const influence = threat.influence ?? threat.radius;
+    const { radius, influence } = radiiOf(threat);
     return [
       { place: onGround(middle), move: (to) => this.#put(`${pointer}/center`, to) },
-      { place: onGround({ x: middle.x + threat.radius, y: middle.y }), move: size('radius') },
+      { place: onGround({ x: middle.x + radius, y: middle.y }), move: size('radius') },
       { place: onGround({ x: middle.x - influence * 0.7071, y: middle.y - influence * 0.7071 }), move: size('influence') },
     ];
   }

@@ -3,6 +3,7 @@
 import {
   BufferAttribute, BufferGeometry, Group, InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, ShapeUtils, Vector2,
 } from './vendor/three.js';
+import { finite, radiiOf } from './sizes.js';
 
 const ROUND = 48;
 /** From so many threats on, they are drawn with fewer sides. */
@@ -152,9 +153,9 @@ export function threatsOf(document, frame, ground) {
     const common = { index, name: threat.name, low: base, high: Math.max(top, base + 1e-3) };
     if (threat.kind === 'polygon') {
       const ring = (threat.vertices ?? []).filter(isPlace).map(frame.to);
-      if (ring.length >= 3) drawn.push({ ...common, ring, margin: threat.margin ?? 0, center: null });
-    } else if (isPlace(threat.center) && threat.radius > 0) {
-      drawn.push({ ...common, center: frame.to(threat.center), radius: threat.radius, influence: threat.influence ?? threat.radius });
+      if (ring.length >= 3) drawn.push({ ...common, ring, margin: finite(threat.margin), center: null });
+    } else if (isPlace(threat.center) && radiiOf(threat).radius > 0) {
+      drawn.push({ ...common, center: frame.to(threat.center), ...radiiOf(threat) });
     }
   });
   return drawn;

@@ -60,6 +60,10 @@ test('a file that is no scenario is refused in words, and leaves the page as it 
     await page.waitForFunction(() => /wrong.json is no scenario: its [a-z ]+ must be/.test(document.getElementById('notice').textContent));
     await page.click('#notice [aria-label=Dismiss]');
   }
+  for (const [name, text] of [['track.gpx', '<gpx version="1.1"></gpx>'], ['track.csv', 'lat,lon\n1,2\n'], ['other.json', '{"a":1}']]) {
+    await drop(page, name, text, '');
+    await page.waitForFunction((start_) => new RegExp(`^${start_}[^]*What can be opened: .*KML`).test(document.getElementById('notice').textContent), name);
+  }
   await drop(page, 'result.json', JSON.stringify({ engine_version: '0.1.0', waypoints: [start, target] }), 'application/json');
   await page.waitForFunction(() => /result.json is a result, not a scenario/.test(document.getElementById('notice').textContent));
   assert.deepEqual(await document_(page), before_);
@@ -76,6 +80,29 @@ test('what a scenario leaves open is not taken from the one before', async () =>
   await drop(page, 'bare.json', JSON.stringify(bare), 'application/json');
   await page.waitForSelector('[data-pointer="/altitude/min"][aria-invalid=true]');
   for (const pointer of ['/altitude/min', '/threats/0/radius', '/vehicle/min_leg']) assert.equal(await hint(pointer), '–', pointer);
+  await page.done();
+});
+
+test('a field that is no number yet moves nothing else', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  const peak = { center: { x: 300, y: 300 }, height: 20, spread: { x: 90, y: 90 } };
+  const polygon = { kind: 'polygon', vertices: [{ x: 700, y: 100 }, { x: 800, y: 100 }, { x: 800, y: 200 }], margin: 20 };
+  const { area, ...open_ } = SMALL;
+  const document = { ...open_, terrain: { kind: 'peaks', base: 0, peaks: [peak] }, threats: [...SMALL.threats, polygon] };
+  await drop(page, 'letters.json', JSON.stringify(document), 'application/json');
+  await drawn(page, 2);
+  for (const pointer of ['/threats/0/influence', '/threats/1/margin', '/terrain/base', '/terrain/peaks/0/height', '/terrain/peaks/0/spread/x', '/terrain/peaks/0/center/x']) {
+    const [before] = await page.$$eval(`[data-pointer="${pointer}"]`, (fields) => fields.map((field) => field.value));
+    await page.evaluate((at) => {
+      for (let node = document.querySelector(`[data-pointer="${at}"]`); node; node = node.parentElement) if (node.tagName === 'DETAILS') node.open = true;
+    }, pointer);
+    await fill(page, pointer, '12a');
+    await page.waitForSelector(`[data-pointer="${pointer}"][aria-invalid=true]`);
+    assert.ok(await page.evaluate(() => Number.isFinite(globalThis.noctule.groundAt(500, 500))), pointer);
+    await fill(page, pointer, before);
+  }
+  await drawn(page, 2);
   await page.done();
 });
 

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { FIRST, LONG, SMALL, ask, drawn, fill, open, wire } from './support.js';
+import { FIRST, LONG, SMALL, ask, drawn, drop, fill, open, wire } from './support.js';
 import { chrome, site } from './together.js';
 
 /** A plan that runs until it is stopped. */
@@ -97,6 +97,11 @@ test('an edit that cannot be checked says so, until one can', async () => {
   there = false;
   await fill(page, '/threats/0/radius', '-3');
   await page.waitForFunction(() => /not checked/.test(document.getElementById('notice').textContent));
+  // Neither hides the other.
+  await drop(page, 'broken.json', '{', 'application/json');
+  await page.waitForFunction(() => /not checked.*broken.json is no JSON/.test(document.getElementById('notice').textContent));
+  await page.locator('#notice [aria-label=Dismiss]').last().click();
+  assert.match(await page.textContent('#notice'), /not checked/);
   there = true;
   // Without another change.
   await page.waitForSelector('[data-pointer="/threats/0/radius"][aria-invalid=true]');

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { FIRST, LONG, SMALL, WALLED, color, contrasts, document_, drawn, fill, groundPoint, made, open, plan, settled } from './support.js';
+import { FIRST, LONG, SMALL, WALLED, color, contrasts, document_, drawn, drop, fill, groundPoint, made, open, plan, settled } from './support.js';
 import { chrome, site } from './together.js';
 
 const PHONE = { viewport: { width: 360, height: 740 }, hasTouch: true, isMobile: true };
@@ -100,13 +100,25 @@ test('a search is said to run, and nothing of a connection that was never lost',
 });
 
 test('what cannot be planned is told in words, and leads to the nearest field', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  const document = { ...SMALL, planner: { ...SMALL.planner, swarm: 3 } };
+  await drop(page, 'swarm.json', JSON.stringify(document), 'application/json');
+  await drawn(page, 1);
+  await page.click('#plan');
+  await page.waitForFunction(() => /cannot be planned yet: one thing is to mend/.test(document.getElementById('notice').textContent));
+  assert.match(await focus(page), /^\/planner\//);
+  await page.done();
+});
+
+test('a route to begin with that is gone is said to be gone', async () => {
   const id = await made(site.url, SMALL);
   const page = await open(chrome, `${site.url}#plan=${id}`);
   await page.waitForSelector('.verdict');
   await fetch(`${site.url}/plans/${id}`, { method: 'DELETE' });
   await page.click('#replan');
-  await page.waitForFunction(() => /cannot be planned yet: one thing is to mend/.test(document.getElementById('notice').textContent));
-  assert.match(await focus(page), /^\/planner\//);
+  await page.waitForFunction(() => /no route to begin with: .*Plan begins without one/.test(document.getElementById('notice').textContent));
+  await plan(page);
   await page.done();
 });
 

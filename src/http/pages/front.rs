@@ -69,7 +69,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 52] = [
+static FILES: [File; 53] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -106,6 +106,7 @@ static FILES: [File; 52] = [
     file!("save.js"),
     file!("scene.js"),
     file!("silence.js"),
+    file!("sizes.js"),
     file!("stage.js"),
     file!("steps.js"),
     file!("stream.js"),

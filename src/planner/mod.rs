@@ -26,6 +26,7 @@ mod recount;
 mod roomier;
 mod rules;
 mod search;
+mod share_out;
 mod smoothing;
 mod starts;
 #[cfg(test)]
@@ -143,6 +144,9 @@ fn search_on(model: &Model, lower: f64, log: &mut Log) -> StopReason {
     }
     if goes_on(reason) && roomier::is_worthwhile(model, log) {
         reason = roomier::search(model, log);
+    }
+    if goes_on(reason) && share_out::is_worthwhile(model, log) {
+        reason = share_out::search(model, log);
     }
     reason
 }

@@ -38,7 +38,7 @@ pub(super) fn is_worthwhile(model: &Model, lower: f64, log: &Log) -> bool {
 
 /// Whether a route turns as much as a full circle does. Circles above a summit, say, are made of few waypoints each, and
 /// how many are left for the rest decides how well they follow the ground.
-fn circles(route: &[Point3]) -> bool {
+pub(super) fn circles(route: &[Point3]) -> bool {
     turns(route).map(f64::abs).sum::<f64>() >= TAU
 }
 

@@ -28,6 +28,7 @@ use crate::cost::{Model, metre};
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 use deals::deals;
+pub(super) use deals::dealt;
 use effort::Effort;
 use legs::Legs;
 use limits::{Limit, Limits};

@@ -30,6 +30,8 @@ pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
 /// Put one waypoint after the other on the longest leg, bring what comes of it within the limits, and go on from the
 /// best of these routes while they become better.
 pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
+    // It takes a moment, and the best so far may be all there is.
+    log.tell();
     loop {
         let before = log.best.cost;
         let legs = log.route.len() - 1;
@@ -47,7 +49,7 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
         if log.has_converged() {
             return StopReason::Converged;
         }
-        if log.best.cost > before * (1.0 - WORTH) {
+        if log.best.cost >= before * (1.0 - WORTH) {
             return StopReason::Iterations;
         }
     }
@@ -140,6 +142,19 @@ mod tests {
             "{:?}",
             log.best
         );
+    }
+
+    /// Nothing costs less, and nothing is gained.
+    #[test]
+    fn a_route_that_costs_nothing_is_the_end() {
+        let mut scenario = summit();
+        (scenario.weights.fuel, scenario.weights.altitude) = (0.0, 0.0);
+        let model = Model::new(&scenario);
+        let mut nobody = Nobody;
+        let mut log = Log::new(&model, &mut nobody, &Nobody);
+        log.offer_unpriced(&circling(&scenario));
+        assert_eq!(search(&model, &mut log), StopReason::Iterations);
+        assert!(log.best.cost.abs() < f64::EPSILON);
     }
 
     #[test]

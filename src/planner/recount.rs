@@ -92,7 +92,7 @@ fn numbers(waypoints: usize) -> impl Iterator<Item = usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::planner::tests::{Looks, disc, mountain, peaks, scenario};
+    use crate::planner::tests::{Looks, descent, disc, mountain, peaks, scenario};
     use crate::planner::{Nobody, plan};
     use crate::scenario::{AltitudeBand, Scenario, Seeding, WarmStart};
     use crate::terrain::{Flat, Terrain};
@@ -148,22 +148,9 @@ mod tests {
     /// With sixteen waypoints alone, the best found costs 792.6: it circles high above the mountain.
     #[test]
     fn a_descent_in_circles_is_searched_with_other_numbers_of_waypoints() {
-        let mut scenario = scenario();
-        scenario.threats.clear();
-        scenario.terrain = peaks(0.0, &[[200.0, 500.0, 401.0, 138.0, 138.0]]);
-        scenario.start = Point3::new(200.0, 500.0, 401.0);
-        scenario.target = Point3::new(900.0, 500.0, 1.0);
-        scenario.area.max.x = 1100.0;
-        scenario.altitude = AltitudeBand {
-            min: 20.0,
-            max: 120.0,
-        };
+        let mut scenario = descent(&[[200.0, 500.0, 401.0, 138.0, 138.0]], 1.0);
         scenario.vehicle.max_climb_deg = 20.0;
         scenario.vehicle.min_leg = (scenario.target - scenario.start).norm() / 170.0;
-        scenario.planner.seeding = Seeding::Tangent;
-        scenario.planner.polish = true;
-        scenario.planner.waypoints = 16;
-        (scenario.planner.population, scenario.planner.iterations) = (30, 30);
         scenario.planner.seed = 2;
         let outcome = plan(&scenario, &mut Nobody, &Nobody);
         assert!(outcome.feasible && circles(&outcome.waypoints));

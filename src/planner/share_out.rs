@@ -60,45 +60,28 @@ mod tests {
     use super::*;
     use crate::geometry::Point3;
     use crate::planner::Nobody;
-    use crate::planner::tests::{Looks, peaks, scenario};
-    use crate::scenario::{AltitudeBand, Scenario, Seeding, WarmStart};
+    use crate::planner::tests::{Looks, descent};
+    use crate::scenario::{Scenario, WarmStart};
     use crate::terrain::{Flat, Terrain};
 
     /// A steep mountain that is left by a vehicle that descends slowly, and others before the target.
     fn summit() -> Scenario {
-        let mut scenario = scenario();
-        scenario.threats.clear();
-        scenario.terrain = peaks(
-            0.0,
-            &[
-                [200.00, 500.00, 356.39, 85.57, 85.57],
-                [875.23, 415.28, 57.31, 87.90, 86.45],
-                [870.94, 847.24, 80.00, 118.81, 79.44],
-                [451.61, 295.21, 83.40, 105.06, 66.22],
-                [403.84, 765.90, 162.45, 62.73, 56.63],
-            ],
-        );
-        scenario.start = Point3::new(200.0, 500.0, 356.39);
-        scenario.target = Point3::new(900.0, 500.0, 20.26);
-        scenario.area.max.x = 1100.0;
-        scenario.altitude = AltitudeBand {
-            min: 20.0,
-            max: 120.0,
-        };
-        (
-            scenario.vehicle.max_turn_deg,
-            scenario.vehicle.max_climb_deg,
-        ) = (60.0, 15.0);
+        let mountains = [
+            [200.00, 500.00, 356.39, 85.57, 85.57],
+            [875.23, 415.28, 57.31, 87.90, 86.45],
+            [870.94, 847.24, 80.00, 118.81, 79.44],
+            [451.61, 295.21, 83.40, 105.06, 66.22],
+            [403.84, 765.90, 162.45, 62.73, 56.63],
+        ];
+        let mut scenario = descent(&mountains, 20.26);
+        scenario.vehicle.max_turn_deg = 60.0;
+        scenario.vehicle.max_climb_deg = 15.0;
         scenario.vehicle.min_leg = 4.57;
         scenario.weights.fuel = 0.5;
-        scenario.planner.seeding = Seeding::Tangent;
-        scenario.planner.polish = true;
-        scenario.planner.waypoints = 16;
-        (scenario.planner.population, scenario.planner.iterations) = (30, 30);
         scenario
     }
 
-    /// Circles of fifteen waypoints, and a long leg high above the ground.
+    /// Circles of fifteen waypoints, and a long leg high above the ground, as Newton's method leaves them.
     fn circling(scenario: &Scenario) -> Vec<Point3> {
         let free = [
             [227.58, 512.07, 356.15],
@@ -118,23 +101,24 @@ mod tests {
             [118.80, 437.72, 163.96],
             [202.30, 398.16, 156.43],
         ];
-        let free = free.map(|[x, y, z]| Point3::new(x, y, z));
-        [&[scenario.start], &free[..], &[scenario.target]].concat()
+        let free = free.map(Point3::from);
+        let mut route = [&[scenario.start], &free[..], &[scenario.target]].concat();
+        Newton::new(&Model::new(scenario), &Nobody).improve(&mut route, &[]);
+        route
     }
 
     #[test]
     fn circles_give_waypoints_to_the_rest() {
         let scenario = summit();
         let model = Model::new(&scenario);
-        let mut route = circling(&scenario);
-        let refined = Newton::new(&model, &Nobody).improve(&mut route, &[]);
-        assert!(
-            refined.is_feasible() && refined.cost > 1200.0,
-            "{refined:?}"
-        );
         let mut nobody = Nobody;
         let mut log = Log::new(&model, &mut nobody, &Nobody);
-        log.offer(&route, refined);
+        log.offer_unpriced(&circling(&scenario));
+        assert!(
+            log.best.is_feasible() && log.best.cost > 1200.0,
+            "{:?}",
+            log.best
+        );
         assert!(is_worthwhile(&model, &log));
         assert_eq!(search(&model, &mut log), StopReason::Iterations);
         assert!(
@@ -161,8 +145,7 @@ mod tests {
     fn what_was_found_until_a_stop_is_kept() {
         let scenario = summit();
         let model = Model::new(&scenario);
-        let mut known = circling(&scenario);
-        Newton::new(&model, &Nobody).improve(&mut known, &[]);
+        let known = circling(&scenario);
         let found = |looks: &Looks| {
             let mut nobody = Nobody;
             let mut log = Log::new(&model, &mut nobody, looks);
@@ -181,8 +164,7 @@ mod tests {
     #[test]
     fn level_ground_known_routes_and_many_waypoints_are_left_as_they_are() {
         let scenario = summit();
-        let mut known = circling(&scenario);
-        Newton::new(&Model::new(&scenario), &Nobody).improve(&mut known, &[]);
+        let known = circling(&scenario);
         let worthwhile_but = |change: fn(&mut Scenario)| {
             let mut scenario = scenario.clone();
             change(&mut scenario);

@@ -1,7 +1,7 @@
 mod scenes;
 
 pub(super) use self::scenes::{
-    disc, hilly_scenario, mountain, peaks, radar, route, scenario, slalom, soft_wall, wall,
+    descent, disc, hilly_scenario, mountain, peaks, radar, route, scenario, slalom, soft_wall, wall,
 };
 use super::newton::Newton;
 use super::*;

@@ -53,6 +53,27 @@ pub(in crate::planner) fn mountain(height: f64, is_down: bool) -> Scenario {
     scenario
 }
 
+/// From the top of the first of these mountains down to `height` beyond all of them, without threats, planned with
+/// sixteen waypoints and few bats.
+pub(in crate::planner) fn descent(mountains: &[[f64; 5]], height: f64) -> Scenario {
+    let mut scenario = scenario();
+    let [x, y, top, ..] = mountains[0];
+    scenario.threats.clear();
+    scenario.terrain = peaks(0.0, mountains);
+    scenario.start = Point3::new(x, y, top);
+    scenario.target = Point3::new(900.0, y, height);
+    scenario.area.max.x = 1100.0;
+    scenario.altitude = AltitudeBand {
+        min: 20.0,
+        max: 120.0,
+    };
+    scenario.planner.seeding = Seeding::Tangent;
+    scenario.planner.polish = true;
+    scenario.planner.waypoints = 16;
+    (scenario.planner.population, scenario.planner.iterations) = (30, 30);
+    scenario
+}
+
 /// A disc with a soft zone of 30 m.
 pub(in crate::planner) fn radar(x: f64, y: f64, radius: f64) -> Threat {
     disc([x, y, radius, radius + 30.0])

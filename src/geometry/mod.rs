@@ -10,10 +10,12 @@ mod quadratic;
 mod rect;
 pub mod ring;
 mod segment;
+mod simplify;
 
 pub use quadratic::Quadratic;
 pub use rect::Rect;
 pub use segment::{LEVEL, Segment};
+pub use simplify::{Change, Side, simplified};
 
 /// A point of the horizontal plane, metres.
 pub type Point2 = nalgebra::Point2<f64>;

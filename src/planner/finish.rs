@@ -47,6 +47,12 @@ const FINE_STEPS: Steps = Steps {
     ..LAST_STEPS
 };
 
+/// Steps of the polish of a route that is nearly in place.
+const BACK_STEPS: Steps = Steps {
+    from: 2e-3,
+    ..LAST_STEPS
+};
+
 /// Where else than along its best route a search may end.
 #[derive(Default)]
 pub(super) struct Leads<'r> {
@@ -103,6 +109,13 @@ pub(super) fn finish_from(model: &Model, mut route: Vec<Point3>, log: &mut Log) 
     let fitness = newton.improve(&mut route, &[]);
     log.evaluations += newton.evaluations;
     log.offer(&route, fitness);
+}
+
+/// Bring `route`, which is the best where threats are a little larger, to where they are.
+pub(super) fn bring_back(model: &Model, mut route: Vec<Point3>, log: &mut Log) {
+    let fitness = polish(model, &mut route, BACK_STEPS, log);
+    log.offer(&route, fitness);
+    bring_home(model, &[], log);
 }
 
 /// The last metres decide which of two ways is cheaper: one of the `others`, which were no better than the best before

@@ -102,7 +102,8 @@ impl<'o> Log<'o> {
         self.show(iteration, elapsed_ms);
     }
 
-    fn record(&mut self, iteration: usize, mean_cost: f64, feasible_fraction: f64) {
+    /// A point of the curve whose swarm is known by its figures.
+    pub(super) fn record(&mut self, iteration: usize, mean_cost: f64, feasible_fraction: f64) {
         let elapsed_ms = self.stop.elapsed_ms();
         let best = self.best;
         self.show(iteration, elapsed_ms);
@@ -120,7 +121,7 @@ impl<'o> Log<'o> {
     }
 
     /// Pass the best route to the observer, unless it knows it.
-    fn show(&mut self, iteration: usize, elapsed_ms: f64) {
+    pub(super) fn show(&mut self, iteration: usize, elapsed_ms: f64) {
         if self.reported.as_ref() == Some(&self.route) {
             return;
         }

@@ -27,6 +27,7 @@ mod roomier;
 mod rules;
 mod search;
 mod share_out;
+mod simpler;
 mod smoothing;
 mod starts;
 #[cfg(test)]
@@ -102,18 +103,9 @@ impl Stop for Nobody {
 pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -> Outcome {
     let model = Model::new(scenario);
     let mut log = Log::new(&model, observer, stop);
-    let (reason, lower) = if scenario.planner.gap > 0.0 {
-        // At each step the search checks whether it is near enough to the bound.
-        let is_over = || why_stop(scenario, stop).is_some();
-        let lower = seeding::lower_bound_until(scenario, &is_over);
-        log.lower = Some(lower);
-        (search(&model, &mut log), lower)
-    } else {
-        beside::bounded(scenario, stop, || search(&model, &mut log))
-    };
-    let reason = match reason {
-        StopReason::Iterations => search_on(&model, lower, &mut log),
-        ended => ended,
+    let (reason, lower) = match simpler::scene(scenario) {
+        Some(scene) => simpler::searched(&model, &scene, &mut log),
+        None => searched(&model, scenario, &mut log),
     };
     // Only now: the searches after the last iteration are one point of the curve together.
     log.last_point();
@@ -121,6 +113,25 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
     let cut_short = why_stop(scenario, stop).filter(|_| reason == StopReason::Iterations);
     let stop_reason = cut_short.unwrap_or(reason);
     measured(&model, log.route, log.convergence, lower, stop_reason)
+}
+
+/// Search routes of `model`, and compute the bound of `scenario` meanwhile.
+fn searched(model: &Model, scenario: &Scenario, log: &mut Log) -> (StopReason, f64) {
+    let stop = log.stop;
+    let (reason, lower) = if scenario.planner.gap > 0.0 {
+        // At each step the search checks whether it is near enough to the bound.
+        let is_over = || why_stop(scenario, stop).is_some();
+        let lower = seeding::lower_bound_until(scenario, &is_over);
+        log.lower = Some(lower);
+        (search(model, log), lower)
+    } else {
+        beside::bounded(scenario, stop, || search(model, log))
+    };
+    let reason = match reason {
+        StopReason::Iterations => search_on(model, lower, log),
+        ended => ended,
+    };
+    (reason, lower)
 }
 
 fn search(model: &Model, log: &mut Log) -> StopReason {

@@ -1,7 +1,8 @@
 mod scenes;
 
 pub(super) use self::scenes::{
-    descent, disc, hilly_scenario, mountain, peaks, radar, route, scenario, slalom, soft_wall, wall,
+    airspace, descent, disc, hilly_scenario, lobed, mountain, peaks, radar, route, scenario,
+    slalom, soft_wall, wall,
 };
 use super::newton::Newton;
 use super::*;
@@ -10,10 +11,11 @@ use crate::geometry::Point2;
 use crate::scenario::{AltitudeBand, Seeding, WarmStart};
 use crate::threat::{Cylinder, Shape, Threat};
 
+/// All that a run reports.
 #[derive(Default)]
-struct Diary {
-    points: Vec<ConvergencePoint>,
-    incumbents: Vec<Incumbent>,
+pub(super) struct Diary {
+    pub(super) points: Vec<ConvergencePoint>,
+    pub(super) incumbents: Vec<Incumbent>,
 }
 
 impl Observer for Diary {

@@ -7,12 +7,14 @@ mod arc;
 mod bound;
 mod obstacles;
 mod outline;
+mod simpler;
 mod steep;
 mod taut;
 
 pub use bound::{WaysSought, cheap_ways, cheapest_slip, lower_bound, lower_bound_until};
 pub use obstacles::Obstacles;
 pub use outline::{Outline, OutlineShape};
+pub use simpler::simpler;
 pub use steep::steep_ground;
 pub use taut::{Piece, TautString, TautStrings, taut_strings, taut_strings_until};
 

@@ -122,8 +122,33 @@ fn polygon() -> impl Strategy<Value = String> {
         })
 }
 
+/// Rings of many corners round their middle, as airspace has: smooth, or jagged.
+fn airspace() -> impl Strategy<Value = String> {
+    (
+        [0.0..1000.0f64, 0.0..1000.0f64],
+        15.0..160.0f64,
+        prop::collection::vec(-1.0..1.0f64, 40..80),
+        prop_oneof![Just(0.0), Just(0.005), Just(0.1)],
+        prop_oneof![Just(0.0), 0.0..90.0f64],
+        heights(),
+    )
+        .prop_map(|([x, y], radius, corners, jagged, margin, heights)| {
+            let step = std::f64::consts::TAU / corners.len() as f64;
+            let corner = |(idx, off): (usize, &f64)| {
+                let (sin, cos) = libm::sincos(step * idx as f64);
+                let away = radius * (1.0 + jagged * off);
+                format!(r#"{{"x": {}, "y": {}}}"#, x + away * cos, y + away * sin)
+            };
+            let vertices: Vec<String> = corners.iter().enumerate().map(corner).collect();
+            format!(
+                r#"{{"kind": "polygon", "vertices": [{}], "margin": {margin}{heights}}}"#,
+                vertices.join(", ")
+            )
+        })
+}
+
 fn drawn() -> impl Strategy<Value = Drawn> {
-    let threat = prop_oneof![3 => cylinder(), 2 => polygon()];
+    let threat = prop_oneof![6 => cylinder(), 4 => polygon(), 1 => airspace()];
     (
         prop::collection::vec(threat, 0..8),
         log(-3.0, 1.0),

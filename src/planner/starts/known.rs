@@ -2,6 +2,15 @@
 
 use crate::cost::Model;
 use crate::geometry::Point3;
+use crate::scenario::WarmStart;
+
+/// The route that the request gives to start from, if it gives one.
+pub(in crate::planner) fn given(model: &Model) -> Option<Vec<Point3>> {
+    match &model.scenario.planner.warm_start {
+        Some(WarmStart::Waypoints(points)) => Some(route(model, points)),
+        Some(WarmStart::Plan(_)) | None => None,
+    }
+}
 
 /// From start to target through `points`, which may include the ends; points outside the area or the allowed heights
 /// are brought inside.

@@ -34,6 +34,7 @@ mod worth;
 pub(super) use count::with_waypoints;
 pub(super) use heap::spread;
 pub(super) use height::steepest;
+pub(super) use known::given;
 pub(super) use round::at_heights_of;
 pub(super) use vast::is_vast;
 

@@ -11,7 +11,7 @@ use crate::cost::Model;
 use crate::geometry::{Point2, Point3};
 use crate::optimizer::Fitness;
 use crate::planner::price::price;
-use crate::scenario::{Seeding, WarmStart};
+use crate::scenario::Seeding;
 use crate::seeding::{Obstacles, Outline, TautString, steep_ground, taut_strings_until};
 use crate::threat::Threat;
 
@@ -67,10 +67,7 @@ impl Shapes {
     /// All shapes that a search of `model` may start from; once `is_over`, those found so far.
     pub(super) fn find(model: &Model, is_over: &dyn Fn() -> bool) -> Self {
         let settings = &model.scenario.planner;
-        let known = match &settings.warm_start {
-            Some(WarmStart::Waypoints(points)) => Some(known::route(model, points)),
-            Some(WarmStart::Plan(_)) | None => None,
-        };
+        let known = known::given(model);
         let mut shapes = Self {
             is_known: known.is_some(),
             routes: known.into_iter().collect(),

@@ -114,6 +114,33 @@ pub(in crate::planner) fn soft_wall(
     }
 }
 
+/// Airspace with a soft zone of 30 m and this many corners: five lobes round x and y, some `radius` from there.
+pub(in crate::planner) fn lobed([x, y, radius]: [f64; 3], corners: usize) -> Threat {
+    let step = std::f64::consts::TAU / corners as f64;
+    let corner = |idx: usize| {
+        let (sin, cos) = libm::sincos(step * idx as f64);
+        let away = radius * (1.0 + 0.2 * libm::sin(5.0 * step * idx as f64));
+        Point2::new(x + away * cos, y + away * sin)
+    };
+    let ring = (0..corners).map(corner).collect();
+    Threat {
+        name: None,
+        shape: Shape::Polygon(Polygon::new(ring, 30.0)),
+        base: None,
+        top: None,
+    }
+}
+
+/// Such a zone of two hundred corners between start and target, planned with few bats.
+pub(in crate::planner) fn airspace() -> Scenario {
+    let mut scenario = scenario();
+    scenario.threats = vec![lobed([480.0, 450.0, 150.0], 200)];
+    scenario.planner.seeding = Seeding::Tangent;
+    scenario.planner.polish = true;
+    (scenario.planner.population, scenario.planner.iterations) = (30, 30);
+    scenario
+}
+
 /// The start of the scenario with three radars, the given free waypoints, and its target.
 pub(in crate::planner) fn route(free: &[[f64; 3]]) -> Vec<Point3> {
     let scenario = scenario();

@@ -25,6 +25,8 @@ mod widening;
 
 use std::cell::Cell;
 
+use super::simpler;
+use crate::geometry::Side;
 use crate::scenario::Scenario;
 use event::Event;
 use field::{Field, cost_of};
@@ -65,6 +67,9 @@ pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
     if prices.fuel <= 0.0 {
         return 0.0;
     }
+    // Smaller rings forbid and cost less.
+    let simpler = simpler(scenario, Side::Within);
+    let scenario = simpler.as_ref().unwrap_or(scenario);
     let straight = prices
         .climbing_at(prices.fuel * prices.direct())
         .max(least_legs(scenario, &prices));

@@ -25,6 +25,28 @@ fn the_bound_is_within_half_a_percent_with_take_off_and_landing() {
     check(two, [30, 120], 510.5145);
 }
 
+/// The best route round it is known from a search of its true ring.
+#[test]
+fn the_bound_is_within_half_a_percent_beside_a_ring_of_a_thousand_corners() {
+    let corner = |idx: i32| {
+        let angle = std::f64::consts::TAU / 1000.0 * f64::from(idx);
+        let (sin, cos) = libm::sincos(angle);
+        let away = 200.0 + 60.0 * libm::sin(3.0 * angle) + 15.0 * libm::sin(20.0 * angle);
+        format!(
+            r#"{{"x": {}, "y": {}}}"#,
+            500.0 + away * cos,
+            450.0 + away * sin
+        )
+    };
+    let corners: Vec<String> = (0..1000).map(corner).collect();
+    let bound = lower_bound(&scenario(&format!(
+        r#""threats": [{{"kind": "polygon", "margin": 30, "vertices": [{}]}}]"#,
+        corners.join(", ")
+    )));
+    let best = 544.7142;
+    assert!(bound <= best && best / bound <= 1.005, "{bound} {best}");
+}
+
 /// Where only length counts, the way out of the zone around each end may be flown in any number of legs.
 #[test]
 fn the_bound_counts_the_climb_out_of_the_zones_around_both_ends() {

@@ -14,7 +14,7 @@ pub(super) struct Family {
 }
 
 /// All kinds.
-pub(super) const FAMILIES: [Family; 12] = [
+pub(super) const FAMILIES: [Family; 13] = [
     Family {
         name: "discs",
         about: "3 to 12 discs with soft zones, weights and vehicle of the paper",
@@ -69,6 +69,11 @@ pub(super) const FAMILIES: [Family; 12] = [
         name: "valleys",
         about: "6 to 30 such discs among 3 to 12 peaks",
         draw: valleys,
+    },
+    Family {
+        name: "airspace",
+        about: "1 to 6 outlines of 40 to 400 corners, some with a base or a top, and discs",
+        draw: airspace,
     },
     Family {
         name: "mixed",
@@ -209,6 +214,21 @@ fn valleys(scene: &mut Scene) {
     scene.raise_peaks();
     let count = scene.between(6, 30);
     near_to_each_other(scene, count);
+}
+
+fn airspace(scene: &mut Scene) {
+    scene.any_weights();
+    scene.waypoints = scene.between(5, 30);
+    for _ in 0..scene.between(1, 6) {
+        scene.outline();
+        if scene.chance(0.3) {
+            scene.open_above_or_below();
+        }
+    }
+    for _ in 0..scene.between(0, 6) {
+        let radius = scene.random.between(20.0, 60.0);
+        scene.disc(radius, 20.0);
+    }
 }
 
 fn mixed(scene: &mut Scene) {

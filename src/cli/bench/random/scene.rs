@@ -148,6 +148,42 @@ impl Scene {
         }
     }
 
+    /// Airspace: many corners along waves round its middle; as a disc clear of start and target.
+    pub(super) fn outline(&mut self) {
+        let (radius, margin) = (
+            self.random.between(40.0, 180.0),
+            self.random.between(0.0, 40.0),
+        );
+        let count = self.between(40, 400);
+        let most = self.random.between(0.0, 0.5);
+        let waves: Vec<[f64; 3]> = (2..10)
+            .map(f64::from)
+            .map(|wave| {
+                [
+                    wave,
+                    self.random.between(0.0, most) / wave,
+                    self.random.unit(),
+                ]
+            })
+            .collect();
+        let before = self.threats.len();
+        self.disc(radius, margin);
+        let Some(threat) = self.threats.get_mut(before) else {
+            return;
+        };
+        let farthest = 1.0 + waves.iter().map(|[_, height, _]| height).sum::<f64>();
+        for idx in 0..count {
+            let turns = idx as f64 / count as f64;
+            let up = |[wave, height, phase]: &[f64; 3]| {
+                height * libm::cos(std::f64::consts::TAU * (wave * turns + phase))
+            };
+            let away = 1.0 + waves.iter().map(up).sum::<f64>();
+            threat
+                .corners
+                .push([turns, threat.radius * away / farthest]);
+        }
+    }
+
     /// Make most of the threats placed last passable above or below, most of these above.
     pub(super) fn open_above_or_below(&mut self) {
         let (top, base) = (

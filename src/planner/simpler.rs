@@ -147,7 +147,9 @@ mod tests {
     /// Where the simpler rings leave no way, the true ones do.
     #[test]
     fn where_no_route_is_found_the_true_rings_are_searched() {
-        let scenario = airspace();
+        let mut scenario = airspace();
+        scenario.planner.waypoints = 5;
+        (scenario.planner.population, scenario.planner.iterations) = (10, 10);
         let mut closed = scenario.clone();
         closed.threats.push(wall([0.0, 1000.0], [500.0, 520.0]));
         let model = Model::new(&scenario);

@@ -11,8 +11,8 @@ use crate::threat::{Polygon, Shape, Threat};
 /// Rings with no more corners than this are left as they are.
 const FEW: usize = 16;
 
-/// It is not worth it unless so many times fewer corners are left.
-const FEWER: usize = 2;
+/// It is not worth it where a greater share of all corners than this is left.
+const LEFT: f64 = 2.0 / 3.0;
 
 /// How far a simpler ring may be from the true one, as shares of the direct way from start to target.
 struct Off {
@@ -54,7 +54,8 @@ pub fn simpler(scenario: &Scenario, side: Side) -> Option<Scenario> {
     }
     let simpler = |(idx, threat)| simpler_threat(scenario, idx, threat, side);
     let threats: Vec<Threat> = scenario.threats.iter().enumerate().map(simpler).collect();
-    (corners(&threats) * FEWER <= corners(&scenario.threats)).then(|| Scenario {
+    let left = corners(&threats) as f64 / corners(&scenario.threats) as f64;
+    (left <= LEFT).then(|| Scenario {
         threats,
         ..scenario.clone()
     })

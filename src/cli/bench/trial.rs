@@ -69,7 +69,8 @@ pub(super) fn run(scenario: &Scenario) -> Trial {
         .violations
         .iter()
         .map(|violation| violation.amount)
-        .sum();
+        // From 0, since a sum of nothing is -0.
+        .fold(0.0, |sum, amount| sum + amount);
     Trial {
         seed: scenario.planner.seed,
         feasible: outcome.feasible,

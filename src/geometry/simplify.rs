@@ -212,12 +212,13 @@ impl Outline {
     /// Whether no other part of the ring reaches into the triangle of `step`.
     fn is_free(&self, step: &Step) -> bool {
         let [before, after] = self.beside(step.corner);
-        let (own, base) = if step.is_drawn_out {
-            ([before, step.corner, after], [step.corner, after])
+        let own = [before, step.corner, after];
+        let from = if step.is_drawn_out {
+            step.corner
         } else {
-            ([before, step.corner, after], [before, after])
+            before
         };
-        let [a, b] = base.map(|corner| self.at(corner));
+        let [a, b] = [from, after].map(|corner| self.at(corner));
         let triangle = [a, step.at, b];
         let extent = Rect::around(triangle).expect("three points").grown(HAIR);
         let [low, high] = [extent.min, extent.max];

@@ -7,6 +7,7 @@ import { axes, isGeodetic } from './frame.js';
 import { say } from './notice.js';
 import { faultText, threatName } from './words.js';
 
+/** Of threats, and of the corners of each, so many are listed at a time. */
 const PAGE = 20;
 /** Of faults at most so many are listed. */
 const MOST_FAULTS = 12;
@@ -16,6 +17,10 @@ const KINDS = { cylinder: 'Cylinder', polygon: 'Polygon' };
 export class Editor {
   #shape = '';
   #page = 0;
+  /** Which part of its corners each threat shows, where not the first. */
+  #corners = new Map();
+  /** Which parts that can be folded were open when the form was last built. */
+  #open = new Set();
   #faults = [];
   #chosen = '';
   #menu = { scenarios: [], algorithms: [], terrains: [] };
@@ -27,8 +32,10 @@ export class Editor {
     this.acts = acts;
     this.form = new Form(root, draft);
     draft.addEventListener('change', ({ detail: { why } }) => {
+      const isSame = why === 'edited' || why === 'stepped';
+      if (!isSame) this.#corners.clear();
       // What another document leaves open, the service has yet to say.
-      this.show(why === 'edited' || why === 'stepped' ? undefined : null);
+      this.show(isSame ? undefined : null);
     });
   }
 
@@ -50,7 +57,7 @@ export class Editor {
     const document = this.draft.document;
     if (!document) return;
     const shape = JSON.stringify([
-      document.frame, document.terrain?.kind, document.terrain?.peaks?.length, this.#page,
+      document.frame, document.terrain?.kind, document.terrain?.peaks?.length, this.#page, [...this.#corners],
       (document.threats ?? []).map((threat) => [threat.kind, threat.vertices?.length]),
     ]);
     if (shape !== this.#shape) {
@@ -85,8 +92,9 @@ export class Editor {
 
   /** Brings the field of a pointer into sight, and the pencil to it. */
   goTo(pointer) {
-    const threat = pointer.match(/^\/threats\/(\d+)/);
-    if (threat) this.#turnTo(Number(threat[1]));
+    const [, threat, corner] = pointer.match(/^\/threats\/(\d+)(?:\/vertices\/(\d+))?/) ?? [];
+    if (threat) this.#turnTo(Number(threat));
+    if (corner) this.#turnCorners(Number(threat), Math.floor(Number(corner) / PAGE));
     const input = this.form.nearest(pointer)?.input;
     if (!input) return;
     for (let node = input; node; node = node.parentElement) if (node.tagName === 'DETAILS') node.open = true;
@@ -108,6 +116,11 @@ export class Editor {
     this.show();
   }
 
+  #turnCorners(threat, page) {
+    this.#corners.set(threat, page);
+    this.show();
+  }
+
   #title(document) {
     const note = this.root.querySelector('.frame-note');
     if (note) note.textContent = isGeodetic(document) ? `WGS 84, altitudes above ${document.altitude_datum === 'ellipsoid' ? 'the ellipsoid' : 'mean sea level'}` : 'metres, x east, y north, z up';
@@ -115,10 +128,10 @@ export class Editor {
 
   #build(document) {
     const focused = focusIn(this.root);
-    const open = new Set([...this.root.querySelectorAll('details[open]')].map((details) => details.dataset.part));
-    if (!this.root.childElementCount) open.add('limits');
+    this.#open = new Set([...this.root.querySelectorAll('details[open]')].map((details) => details.dataset.part));
+    if (!this.root.childElementCount) this.#open.add('limits');
     this.form.forget(this.root);
-    const section = (part, title, ...content) => el('details', { class: 'part', data: { part }, open: open.has(part) }, el('summary', {}, title), ...content);
+    const section = (part, title, ...content) => el('details', { class: 'part', data: { part }, open: this.#open.has(part) }, el('summary', {}, title), ...content);
     this.root.replaceChildren(
       this.#source(),
       el('div', { class: 'faults', role: 'group', 'aria-label': 'Faults', hidden: true }),
@@ -167,17 +180,16 @@ export class Editor {
 
   #threats(document) {
     const threats = document.threats ?? [];
-    const pages = Math.max(1, Math.ceil(threats.length / PAGE));
-    this.#page = Math.min(this.#page, pages - 1);
-    const first = this.#page * PAGE;
-    const turn = (by_) => el('button', { type: 'button', id: by_ < 0 ? 'earlier' : 'later', disabled: by_ < 0 ? this.#page === 0 : this.#page + 1 >= pages, onclick: () => {
-      this.#page += by_;
+    const part = partOf(threats.length, this.#page);
+    this.#page = part.page;
+    const turn = (page) => {
+      this.#page = page;
       this.show();
-    } }, by_ < 0 ? 'Earlier' : 'Later');
+    };
     return el('section', { class: 'threats', 'aria-labelledby': 'threats-head' },
       el('h2', { id: 'threats-head', tabindex: -1 }, 'Threats ', el('span', { class: 'faint' }, String(threats.length))),
-      el('ol', { class: 'cards', start: first }, threats.slice(first, first + PAGE).map((threat, k) => this.#threat(document, threat, first + k))),
-      pages > 1 && el('p', { class: 'row' }, turn(-1), el('span', { class: 'faint' }, `${first}–${Math.min(first + PAGE, threats.length) - 1}`), turn(1)),
+      el('ol', { class: 'cards', start: part.first }, threats.slice(part.first, part.end).map((threat, k) => this.#threat(document, threat, part.first + k))),
+      turner(part, turn, ['earlier', 'later']),
       el('p', { class: 'row' },
         el('button', { type: 'button', id: 'add-cylinder', onclick: () => this.#add('cylinder') }, 'Add a cylinder'),
         el('button', { type: 'button', id: 'add-polygon', onclick: () => this.#add('polygon') }, 'Add a polygon')));
@@ -194,6 +206,7 @@ export class Editor {
     const names = isGeodetic(document) ? ['Latitude °', 'Longitude °'] : ['East x m', 'North y m'];
     const limits = [this.form.number(`${pointer}/base`, 'Base', 'm', { empty: null }), this.form.number(`${pointer}/top`, 'Top', 'm', { empty: null })];
     const remove = el('button', { type: 'button', class: 'quiet', 'aria-label': `Remove ${threatName(threat, index)}`, title: 'Remove', onclick: () => {
+      this.#corners.clear();
       this.draft.set(pointer, undefined);
       by('threats-head')?.scrollIntoView({ block: 'nearest' });
       (this.root.querySelector(`[data-index="${Math.min(index, this.draft.document.threats.length - 1)}"] .head button`) ?? by('add-cylinder')).focus();
@@ -201,12 +214,7 @@ export class Editor {
     const body = threat.kind === 'polygon'
       ? [
         el('div', { class: 'grid three' }, this.form.number(`${pointer}/margin`, 'Soft margin', 'm'), ...limits),
-        el('details', { class: 'inner', data: { part: `vertices ${index}` } }, el('summary', {}, `${threat.vertices?.length ?? 0} corners`),
-          (threat.vertices ?? []).map((_, k) => el('div', { class: 'grid pair' },
-            this.form.number(`${pointer}/vertices/${k}/${first}`, `${k}: ${label(names[0])[0]}`, label(names[0])[1]),
-            this.form.number(`${pointer}/vertices/${k}/${second}`, ...label(names[1])),
-            el('button', { type: 'button', class: 'quiet', 'aria-label': `Remove corner ${k}`, onclick: () => this.draft.set(`${pointer}/vertices/${k}`, undefined) }, '✕'))),
-          el('button', { type: 'button', onclick: () => this.acts.addCorner(index) }, 'Add a corner')),
+        this.#vertices(document, threat, index, names),
       ]
       : [el('div', { class: 'grid three' },
         this.form.number(`${pointer}/center/${first}`, ...label(names[0])), this.form.number(`${pointer}/center/${second}`, ...label(names[1])), limits[0],
@@ -214,6 +222,28 @@ export class Editor {
     return el('li', { class: 'threat', data: { index }, value: index, onfocusin: () => this.acts.select(index) },
       el('div', { class: 'parts', role: 'group' },
         el('div', { class: 'head' }, this.form.text(`${pointer}/name`, `${index}. ${KINDS[threat.kind] ?? 'Threat'}`, { empty: null }), remove), ...body));
+  }
+
+  #vertices(document, threat, index, names) {
+    const pointer = `/threats/${index}/vertices`;
+    const vertices = threat.vertices ?? [];
+    const [first, second] = axes(document);
+    const part = partOf(vertices.length, this.#corners.get(index) ?? 0);
+    const row = (_, at) => {
+      const k = part.first + at;
+      return el('div', { class: 'grid pair' },
+        this.form.number(`${pointer}/${k}/${first}`, `${k}: ${label(names[0])[0]}`, label(names[0])[1]),
+        this.form.number(`${pointer}/${k}/${second}`, ...label(names[1])),
+        el('button', { type: 'button', class: 'quiet', 'aria-label': `Remove corner ${k}`, onclick: () => this.draft.set(`${pointer}/${k}`, undefined) }, '✕'));
+    };
+    const name = `vertices ${index}`;
+    return el('details', { class: 'inner', data: { part: name }, open: this.#open.has(name) }, el('summary', {}, `${vertices.length} corners`),
+      vertices.slice(part.first, part.end).map(row),
+      turner(part, (page) => this.#turnCorners(index, page), [`earlier-${index}`, `later-${index}`]),
+      el('button', { type: 'button', onclick: () => {
+        this.#corners.set(index, Math.floor(vertices.length / PAGE));
+        this.acts.addCorner(index);
+      } }, 'Add a corner'));
   }
 
   #ground(document) {
@@ -277,6 +307,19 @@ export class Editor {
       this.form.number(`/area/min/${first}`, names[0]), this.form.number(`/area/min/${second}`, names[1]),
       this.form.number(`/area/max/${first}`, names[2]), this.form.number(`/area/max/${second}`, names[3])));
   }
+}
+
+/** What is listed of so many: the part `page`, or the last one before it. */
+function partOf(count, page) {
+  const pages = Math.max(1, Math.ceil(count / PAGE));
+  const shown = Math.min(page, pages - 1);
+  return { page: shown, pages, first: shown * PAGE, end: Math.min((shown + 1) * PAGE, count) };
+}
+
+/** Buttons with these ids that turn to other parts of a list, where it has any. */
+function turner({ page, pages, first, end }, turn, [earlier, later]) {
+  const button = (id, text, to) => el('button', { type: 'button', id, disabled: to < 0 || to >= pages, onclick: () => turn(to) }, text);
+  return pages > 1 && el('p', { class: 'row' }, button(earlier, 'Earlier', page - 1), el('span', { class: 'faint' }, `${first}–${end - 1}`), button(later, 'Later', page + 1));
 }
 
 /** What gives the focus back to a part that is built anew; null where it is elsewhere. */

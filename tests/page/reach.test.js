@@ -50,6 +50,39 @@ test('pages of threats are turned without losing the focus', async () => {
   await page.done();
 });
 
+test('the corners of a long outline are listed in parts', async () => {
+  const corner = (k) => ({ x: 500 + 60 * Math.cos((2 * Math.PI * k) / 45), y: 500 + 60 * Math.sin((2 * Math.PI * k) / 45) });
+  const outline = { ...SMALL, threats: [{ kind: 'polygon', vertices: Array.from({ length: 45 }, (_, k) => corner(k)) }] };
+  const page = await open(chrome, `${site.url}#plan=${await made(site.url, outline)}`);
+  await page.waitForSelector('.verdict');
+  await page.click('[data-part="vertices 0"] > summary');
+  const listed = () => page.evaluate(() => {
+    const fields = [...document.querySelectorAll('[data-part="vertices 0"] input')].map(({ dataset }) => dataset.pointer.split('/')[4]);
+    return [fields[0], fields.at(-1), fields.length];
+  });
+  const press = async (selector) => {
+    await page.focus(selector);
+    await page.keyboard.press('Enter');
+  };
+  assert.deepEqual(await listed(), ['0', '19', 40]);
+  await press('#later-0');
+  assert.deepEqual(await listed(), ['20', '39', 40]);
+  assert.equal(await focus(page), 'later-0');
+  await page.keyboard.press('Enter');
+  assert.deepEqual(await listed(), ['40', '44', 10]);
+  assert.equal(await focus(page), 'SUMMARY 45 corners', 'where there are no later ones');
+  await fill(page, '/threats/0/vertices/43/x', 'far');
+  await page.waitForSelector('.faults li button');
+  await press('#earlier-0');
+  assert.deepEqual(await listed(), ['20', '39', 40]);
+  await page.click('.faults li button');
+  assert.equal(await focus(page), '/threats/0/vertices/43/x');
+  await press('#earlier-0');
+  await page.getByRole('button', { name: 'Add a corner' }).click();
+  assert.deepEqual(await listed(), ['40', '45', 12]);
+  await page.done();
+});
+
 test('the ring of a focus is round what has it', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);

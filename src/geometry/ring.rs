@@ -8,6 +8,16 @@ pub fn edges(ring: &[Point2]) -> impl Iterator<Item = (Point2, Point2)> + '_ {
     ring.iter().copied().zip(next.copied())
 }
 
+/// `ring` without points that repeat the one before, the last one among them if it repeats the first.
+#[must_use]
+pub fn distinct(mut ring: Vec<Point2>) -> Vec<Point2> {
+    ring.dedup();
+    if ring.len() > 1 && ring.first() == ring.last() {
+        ring.pop();
+    }
+    ring
+}
+
 /// Twice the area of the simple `ring`, square metres; negative if it is clockwise.
 #[must_use]
 pub fn twice_area(ring: &[Point2]) -> f64 {

@@ -10,7 +10,7 @@ mod outline;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::Point2;
+use super::{Point2, ring};
 use outline::{Outline, Step};
 
 /// On which side of a ring the simpler one lies.
@@ -40,11 +40,7 @@ pub struct Change {
 /// off, as long as `allows` lets them; what it does not allow, it never allows later.
 #[must_use]
 pub fn simplified(ring: &[Point2], side: Side, allows: impl Fn(Change) -> bool) -> Vec<Point2> {
-    let mut corners = ring.to_vec();
-    corners.dedup();
-    if corners.len() > 1 && corners.first() == corners.last() {
-        corners.pop();
-    }
+    let corners = ring::distinct(ring.to_vec());
     if corners.len() <= FEWEST {
         return corners;
     }
@@ -94,7 +90,6 @@ mod tests {
 
     use super::outline::meet;
     use super::*;
-    use crate::geometry::ring;
 
     /// Corners evenly round the origin, this far from it.
     fn round(away: &[f64]) -> Vec<Point2> {

@@ -45,7 +45,10 @@ fn beside_simpler_rings(
 ) -> (StopReason, f64, Vec<Point3>) {
     let simple = Model::new(scene);
     let stop = log.stop;
-    let mut relay = Relay { log, priced: 0 };
+    let mut relay = Relay {
+        priced: log.evaluations,
+        log,
+    };
     let mut own = Log::new(&simple, &mut relay, stop);
     let (reason, lower) = super::searched(&simple, model.scenario, &mut own);
     let (route, evaluations) = (own.route, own.evaluations);
@@ -71,7 +74,7 @@ fn beside_true_rings(model: &Model, lower: f64, log: &mut Log) -> StopReason {
 /// Tells a run of what a search beside simpler rings finds, at the prices of the run.
 struct Relay<'l, 'o> {
     log: &'l mut Log<'o>,
-    /// Routes priced for it.
+    /// Routes priced for it alone.
     priced: u64,
 }
 

@@ -206,11 +206,8 @@ impl Obstacles {
         });
     }
 
-    fn add_ring(&mut self, outline: usize, mut ring: Vec<Point2>, radius: f64) {
-        ring.dedup();
-        if ring.len() > 1 && ring.first() == ring.last() {
-            ring.pop();
-        }
+    fn add_ring(&mut self, outline: usize, ring: Vec<Point2>, radius: f64) {
+        let ring = ring::distinct(ring);
         let count = ring.len();
         let first_body = self.bodies.len();
         let twice_area = ring::twice_area(&ring);

@@ -42,20 +42,14 @@ const NARROWER: f64 = 0.1;
 /// `scenario` with simpler rings on one `side` of its own; `None` where that spares too few corners to be worth it.
 #[must_use]
 pub fn simpler(scenario: &Scenario, side: Side) -> Option<Scenario> {
-    let corners = |threats: &[Threat]| {
-        threats
-            .iter()
-            .filter_map(ring)
-            .map(<[_]>::len)
-            .sum::<usize>()
-    };
-    if corners(&scenario.threats) <= FEW {
+    let rings = |threats| <[Threat]>::iter(threats).filter_map(ring).map(<[_]>::len);
+    if !rings(&scenario.threats).any(|corners| corners > FEW) {
         return None;
     }
     let simpler = |(idx, threat)| simpler_threat(scenario, idx, threat, side);
     let threats: Vec<Threat> = scenario.threats.iter().enumerate().map(simpler).collect();
-    let left = corners(&threats) as f64 / corners(&scenario.threats) as f64;
-    (left <= LEFT).then(|| Scenario {
+    let [left, all] = [&threats, &scenario.threats].map(|threats| rings(threats).sum::<usize>());
+    (left as f64 <= LEFT * all as f64).then(|| Scenario {
         threats,
         ..scenario.clone()
     })

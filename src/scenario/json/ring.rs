@@ -25,34 +25,46 @@ pub(super) enum RingFault {
 /// Check that the closed ring has an area and does not touch itself.
 ///
 /// # Errors
-/// The first [`RingFault`] found; indices are in ascending order.
-pub(super) fn check(vertices: &[Point2]) -> Result<(), RingFault> {
+/// All pairs of repeated vertices, each with the one before at the same place, or the first other [`RingFault`] found;
+/// indices are in ascending order.
+pub(super) fn check(vertices: &[Point2]) -> Result<(), Vec<RingFault>> {
     if vertices.len() < 3 {
-        return Err(RingFault::TooFew);
+        return Err(vec![RingFault::TooFew]);
     }
     let mut order: Vec<usize> = (0..vertices.len()).collect();
     order.sort_by(|a, b| along(vertices[*a], vertices[*b]).then(a.cmp(b)));
-    if let Some(pair) = order
-        .windows(2)
-        .find(|pair| along(vertices[pair[0]], vertices[pair[1]]).is_eq())
-    {
-        return Err(RingFault::Repeated(
-            pair[0].min(pair[1]),
-            pair[0].max(pair[1]),
-        ));
+    let repeated = repeated(vertices, &order);
+    if !repeated.is_empty() {
+        return Err(repeated);
     }
     let (first, last) = (vertices[order[0]], vertices[order[order.len() - 1]]);
     if vertices
         .iter()
         .all(|vertex| turn(first, last, *vertex).is_eq())
     {
-        return Err(RingFault::Flat);
+        return Err(vec![RingFault::Flat]);
     }
     let mut sweep = Sweep {
         vertices,
         status: Vec::new(),
     };
-    order.into_iter().try_for_each(|vertex| sweep.pass(vertex))
+    order
+        .into_iter()
+        .try_for_each(|vertex| sweep.pass(vertex))
+        .map_err(|fault| vec![fault])
+}
+
+/// All vertices that are at the place of an earlier one, given the order in which the sweep passes them.
+fn repeated(vertices: &[Point2], order: &[usize]) -> Vec<RingFault> {
+    let pairs = order.windows(2).map(|pair| [pair[0], pair[1]]);
+    let mut repeated: Vec<[usize; 2]> = pairs
+        .filter(|[one, other]| along(vertices[*one], vertices[*other]).is_eq())
+        .collect();
+    repeated.sort_unstable();
+    repeated
+        .into_iter()
+        .map(|[earlier, later]| RingFault::Repeated(earlier, later))
+        .collect()
 }
 
 /// The order in which the sweep passes points: by x, then by y.
@@ -218,7 +230,16 @@ mod tests {
 
     #[track_caller]
     fn check_ring(vertices: &[(f64, f64)], expected: Result<(), RingFault>) {
+        let expected = expected.map_err(|fault| vec![fault]);
         assert_eq!(check(&ring(vertices)), expected, "{vertices:?}");
+    }
+
+    #[test]
+    fn every_repeated_vertex_is_named() {
+        let (a, b, c, d) = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0));
+        let found = check(&ring(&[a, d, a, c, b, b, a]));
+        let expected = [(0, 2), (2, 6), (4, 5)].map(|(one, other)| RingFault::Repeated(one, other));
+        assert_eq!(found, Err(expected.to_vec()));
     }
 
     #[test]
@@ -289,12 +310,18 @@ mod tests {
         fn the_sweep_agrees_with_the_definition(points in prop::collection::vec((0i8..6, 0i8..6), 3..9)) {
             let points: Vec<_> = points.into_iter().map(|(x, y)| (f64::from(x), f64::from(y))).collect();
             let vertices = ring(&points);
-            match check(&vertices) {
+            match check(&vertices).as_ref().map_err(Vec::as_slice) {
                 Ok(()) => prop_assert!(simple_by_definition(&vertices)),
-                Err(RingFault::Crossing(a, b)) => {
+                Err([RingFault::Crossing(a, b)]) => {
                     prop_assert!(!simple_by_definition(&vertices), "edges {} and {}", a, b);
                 }
-                Err(RingFault::Flat | RingFault::Repeated(..) | RingFault::TooFew) => {}
+                Err([RingFault::Flat | RingFault::TooFew]) => {}
+                Err(repeated) => for fault in repeated {
+                    let RingFault::Repeated(a, b) = fault else {
+                        panic!("only repeated vertices are named together: {repeated:?}");
+                    };
+                    prop_assert_eq!(vertices[*a], vertices[*b]);
+                },
             }
         }
     }

@@ -155,16 +155,22 @@ fn vertices(at: At<'_>, chart: &Chart, faults: &mut Faults) -> Option<Vec<Point2
     if vertices.len() > 1 && vertices.first() == vertices.last() {
         vertices.pop();
     }
-    let Err(fault) = ring::check(&vertices) else {
+    let Err(found) = ring::check(&vertices) else {
         return Some(vertices);
     };
-    let (code, detail) = match fault {
+    for fault in found {
+        let (code, detail) = ring_fault(fault, vertices.len());
+        faults.add(at.path, code, || detail);
+    }
+    None
+}
+
+/// The code and the detail of the fault of a ring with so many vertices.
+fn ring_fault(fault: RingFault, n_vertices: usize) -> (&'static str, String) {
+    match fault {
         RingFault::TooFew => (
             "degenerate-polygon",
-            format!(
-                "vertices has {} different points, must have at least 3",
-                vertices.len()
-            ),
+            format!("vertices has {n_vertices} different points, must have at least 3"),
         ),
         RingFault::Flat => (
             "degenerate-polygon",
@@ -180,7 +186,5 @@ fn vertices(at: At<'_>, chart: &Chart, faults: &mut Faults) -> Option<Vec<Point2
                 "the edges from vertices {a} and {b} cross or touch, must meet nowhere but at their ends"
             ),
         ),
-    };
-    faults.add(at.path, code, || detail);
-    None
+    }
 }

@@ -39,9 +39,21 @@ pub(super) struct Facts {
 }
 
 impl Facts {
-    /// The known values, truncated if long, and a few names of the others.
-    pub(super) fn of(said: Map<String, Value>) -> Self {
+    /// The known values, truncated if long, and a few names of the others. Some programs write `Name` for `name`.
+    pub(super) fn of(mut said: Map<String, Value>) -> Self {
         let is_known = |name: &str| OF_A_THREAT.contains(&name) || OURS.contains(&name);
+        let other_cases: Vec<(String, String)> = said
+            .keys()
+            .map(|name| (name.clone(), name.to_ascii_lowercase()))
+            .filter(|(name, lower)| !is_known(name) && is_known(lower))
+            .collect();
+        for (name, lower) in other_cases {
+            if !said.contains_key(&lower)
+                && let Some(value) = said.remove(&name)
+            {
+                said.insert(lower, value);
+            }
+        }
         let (known, rest): (Map<_, _>, Map<_, _>) =
             said.into_iter().partition(|(name, _)| is_known(name));
         let mut others: Vec<String> = rest
@@ -73,6 +85,12 @@ impl Facts {
         number
             .map(Some)
             .ok_or_else(|| format!("{name} is {value}, must be a number"))
+    }
+
+    /// Whether any of these is there, and not null.
+    pub(super) fn says_any(&self, names: &[&str]) -> bool {
+        let is_said = |name: &&str| self.known.get(*name).is_some_and(|value| !value.is_null());
+        names.iter().any(is_said)
     }
 
     /// Name of the object.

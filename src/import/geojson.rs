@@ -9,10 +9,12 @@ use super::draft::{Draft, Place};
 use super::facts::Facts;
 use super::{Conversion, ImportError, Most};
 
-/// Names that older GeoJSON uses for the only reference system of RFC 7946.
-const WGS84: [&str; 3] = [
+/// Names that older GeoJSON uses for the only reference system of RFC 7946. The last ones mean the latitude first, but
+/// programs that write them put the longitude first all the same, as all GeoJSON does.
+const WGS84: [&str; 4] = [
     "urn:ogc:def:crs:OGC:1.3:CRS84",
     "urn:ogc:def:crs:OGC::CRS84",
+    "urn:ogc:def:crs:EPSG::4326",
     "EPSG:4326",
 ];
 
@@ -104,7 +106,10 @@ fn geometry(draft: &mut Draft, at: &str, within: &str, facts: &Facts, value: &Ge
         GeometryValue::LineString { .. } | GeometryValue::MultiLineString { .. } => {
             draft.leave(at, "a line: points and polygons make a scenario");
         }
-        GeometryValue::MultiPoint { .. } => {
+        GeometryValue::MultiPoint { coordinates } => {
+            if let [only] = coordinates.as_slice() {
+                return point(draft, at, facts, only);
+            }
             draft.leave(at, "many points in one: each must be a feature of its own");
         }
     }

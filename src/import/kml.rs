@@ -132,7 +132,10 @@ impl Placemark {
         }
         match node.tag_name().name() {
             "Point" => point(draft, at, facts, node),
-            "Polygon" => self.rings.extend(outer(draft, at, node)),
+            "Polygon" => {
+                leave_heights(draft, at, facts, node);
+                self.rings.extend(outer(draft, at, node));
+            }
             "MultiGeometry" if depth < DEEPEST => {
                 for inner in node.children().filter(is_shape) {
                     self.geometry(draft, &inner, depth + 1);
@@ -166,6 +169,19 @@ fn point(draft: &mut Draft, at: &str, facts: &Facts, node: &Node) {
         return draft.point(at, facts, place, Some(height));
     }
     draft.point(at, facts, place, Some(alt));
+}
+
+/// Tell that the heights of a polygon are not read: whether they are those of its roof or of its floor, and above which
+/// ground, the file does not say.
+fn leave_heights(draft: &mut Draft, at: &str, facts: &Facts, node: &Node) {
+    let mode = text_of(node, "altitudeMode");
+    let has_heights = mode.is_some_and(|mode| mode != "clampToGround");
+    if has_heights && !facts.says_any(&["kind", "base", "top"]) {
+        draft.leave(
+            at,
+            "the heights of a polygon: it is kept clear of at any height, unless its data have a base or a top",
+        );
+    }
 }
 
 /// The outer ring of a polygon.

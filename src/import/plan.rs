@@ -82,6 +82,10 @@ pub(super) fn convert(document: &Value, most: Most) -> Result<Conversion, Import
     draft.elevation = home.and_then(|home| home.alt.as_f64());
     draft.cruise_speed = speed(mission);
     let stops = stops(&mut draft, items, home);
+    if stops.is_empty() {
+        let detail = "the mission has no item with a position: its first and its last one make start and target";
+        return Err(draft.refused(detail.to_owned()));
+    }
     if let Err(reason) = ends(&mut draft, home, &stops) {
         return Err(draft.refused(reason));
     }
@@ -171,12 +175,14 @@ fn stop<'d>(
     home: Option<Home>,
 ) -> Result<Stop<'d>, String> {
     let param = |index: usize| item["params"][index].as_f64();
-    let on_ground = TAKEOFFS.contains(&command) || LANDINGS.contains(&command);
+    let is_landing = LANDINGS.contains(&command);
+    // A take-off says how high to climb, and a landing mostly nothing.
+    let on_ground = TAKEOFFS.contains(&command) || (is_landing && !lands_elsewhere(item));
     let somewhere = param(4).zip(param(5)).filter(|place| *place != (0.0, 0.0));
     let place = match (somewhere, home) {
         (Some((lat, lon)), _) => Place::new(lon, lat)?,
         // Without a position, an autopilot takes off and lands where it is.
-        (None, Some(Home { place, .. })) if on_ground => place,
+        (None, Some(Home { place, .. })) if on_ground || is_landing => place,
         (None, _) => return Err("an item without a place".to_owned()),
     };
     Ok(Stop {
@@ -185,6 +191,12 @@ fn stop<'d>(
         place,
         on_ground,
     })
+}
+
+/// Whether a landing says at which altitude the ground is; 0 says nothing.
+fn lands_elsewhere(item: &Value) -> bool {
+    matches!(item["frame"].as_u64(), Some(0 | 3 | 5 | 6))
+        && item["params"][6].as_f64().is_some_and(|alt| alt != 0.0)
 }
 
 fn is_above_home(item: &Value) -> bool {

@@ -21,9 +21,11 @@ export function forgetKey() {
 /** Something that a person can understand and do something about. */
 export class Said extends Error {}
 
+export const UNREACHABLE = 'The service cannot be reached.';
+
 /** No answer at all. */
 export class Unreachable extends Said {
-  constructor() { super('The service cannot be reached.'); }
+  constructor() { super(UNREACHABLE); }
 }
 
 /** A refusal: the problem document, or what stood in its place. */

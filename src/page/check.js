@@ -1,8 +1,8 @@
 // The draft, checked by the service as it changes.
 
-import { Said, Unreachable, ask } from './api.js';
+import { Said, UNREACHABLE, Unreachable, ask } from './api.js';
 import { calmly } from './dom.js';
-import { hold, over, tell } from './notice.js';
+import { hold, over, tell, untell } from './notice.js';
 
 const VALIDATE_MS = 300;
 /** So long after the service could not be reached, it is asked again. */
@@ -19,6 +19,7 @@ export function checkAsItChanges(draft, editor, stage) {
     try {
       const { scenario } = await ask('/plans?validate_only=true', { method: 'POST', body: draft.document, signal, quiet: true });
       [UNCHECKED, MAY_NOT_PLAN].forEach(over);
+      untell(UNREACHABLE);
       editor.mark([]);
       editor.show(scenario);
       await stage.sample(scenario, signal);

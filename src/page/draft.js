@@ -26,15 +26,21 @@ function put(node, [part, ...rest], value) {
   }
   const { [part]: old, ...others } = node ?? {};
   const put_ = put(old, rest, value);
-  if (put_ === undefined) return others;
+  // Where the last of its parts is taken away, an object goes too: it says nothing.
+  if (put_ === undefined || (value === undefined && isEmpty(put_))) return others;
   return old === undefined ? { ...others, [part]: put_ } : { ...node, [part]: put_ };
 }
+
+const isEmpty = (node) => typeof node === 'object' && node !== null && !Array.isArray(node) && !Object.keys(node).length;
 
 export class Draft extends EventTarget {
   #past = [];
   #future = [];
   #now = null;
   #last = null;
+  /** Which document it is, counted from the first; those undone and redone go with the number that they had. */
+  #number = 0;
+  #numbers = new WeakMap();
 
   /** The document as it stands; never changed, only replaced. */
   get document() { return this.#now; }
@@ -43,6 +49,7 @@ export class Draft extends EventTarget {
 
   /** Another document altogether. It can be undone, too. */
   replace(document, why = 'replaced') {
+    this.#number += 1;
     this.#become(document, null);
     this.#tell(why);
   }
@@ -68,10 +75,12 @@ export class Draft extends EventTarget {
 
   #step(from, to) {
     if (!from.length) return;
+    const number = this.#numbers.get(this.#now);
     to.push(this.#now);
     this.#now = from.pop();
     this.#last = null;
-    this.#tell('stepped');
+    this.#number = this.#numbers.get(this.#now);
+    this.#tell(this.#number === number ? 'stepped' : 'replaced', null, true);
   }
 
   #become(document, gesture) {
@@ -82,9 +91,10 @@ export class Draft extends EventTarget {
     this.#future = [];
     this.#last = gesture;
     this.#now = document;
+    this.#numbers.set(document, this.#number);
   }
 
-  #tell(why, pointer) {
-    this.dispatchEvent(new CustomEvent('change', { detail: { why, pointer } }));
+  #tell(why, pointer, back = false) {
+    this.dispatchEvent(new CustomEvent('change', { detail: { why, pointer, back } }));
   }
 }

@@ -31,9 +31,11 @@ export class Editor {
     this.draft = draft;
     this.acts = acts;
     this.form = new Form(root, draft);
-    draft.addEventListener('change', ({ detail: { why } }) => {
+    draft.addEventListener('change', ({ detail: { why, back } }) => {
       const isSame = why === 'edited' || why === 'stepped';
       if (!isSame) this.#corners.clear();
+      // To another document, or back to one, of which only the document is known.
+      if (why === 'replaced' && back) this.from('');
       // What another document leaves open, the service has yet to say.
       this.show(isSame ? undefined : null);
     });
@@ -286,7 +288,7 @@ export class Editor {
       el('div', { class: 'grid three' },
         this.form.number('/planner/waypoints', 'Waypoints'), this.form.number('/planner/population', 'Population'), this.form.number('/planner/iterations', 'Iterations'),
         this.form.number('/planner/seed', 'Seed', '', {}), this.form.number('/planner/time_limit_ms', 'Time limit', 'ms', { empty: null }),
-        this.form.number('/planner/parameters/gap', 'Enough gap')),
+        this.form.number('/planner/parameters/gap', 'Enough gap', 'share')),
       this.form.choice('/planner/seeding', 'First population', [['tangent', 'Along tangents of the threats'], ['random', 'Random, as published']], { fallback: 'tangent' }),
       this.form.tick('/planner/polish', 'Polish the best route', true),
     ];

@@ -113,7 +113,13 @@ function fromSamples({ area, columns, rows, elevations }, document, frame) {
     };
     return { ...frame.to(p), z: filled[row * columns + column] };
   };
-  return meshed(columns, rows, node, at);
+  const around = (x, y) => {
+    const middle = frame.from({ x, y, z: 0 });
+    const step = [(0.5 * span(across)) / (columns - 1), (0.5 * span(along)) / (rows - 1)];
+    const places = [-1, 0, 1].flatMap((i) => [-1, 0, 1].map((j) => frame.to({ ...middle, [across]: middle[across] + i * step[0], [along]: middle[along] + j * step[1] })));
+    return Math.max(...places.map((place) => at(place.x, place.y)));
+  };
+  return { ...meshed(columns, rows, node, at), around };
 }
 
 /** Elevation between nodes; beyond the edges that of the edge goes on. `cells` makes columns and rows of a place. */

@@ -12,6 +12,7 @@ const CAN_BE_OPENED = 'What can be opened: scenarios in JSON, GeoJSON, KML, and 
 export async function readFile(file) {
   const text = await file.text();
   const kml = /\.kml$/i.test(file.name) || text.trimStart().startsWith('<');
+  if (text.startsWith('PK')) throw new Said(`${file.name} is a zip archive, as KMZ is: unpack it, and open the doc.kml in it.`);
   if (!kml) {
     let document;
     try {
@@ -27,8 +28,9 @@ export async function readFile(file) {
     }
   }
   const type = kml ? 'application/vnd.google-earth.kml+xml' : 'application/json';
-  const { scenario, assumed, unused } = await ask('/scenarios:convert', { method: 'POST', body: text, type }).catch((refusal) => {
-    throw refusal.status === 422 ? new Said(`${file.name} holds no scenario: ${refusal.message}. ${CAN_BE_OPENED}`) : refusal;
+  // As it is: what its bytes mean is for the service to say.
+  const { scenario, assumed, unused } = await ask('/scenarios:convert', { method: 'POST', body: new Blob([file]), type }).catch((refusal) => {
+    throw [400, 422].includes(refusal.status) ? new Said(`${file.name} holds no scenario: ${refusal.message.replace(/\.$/, '')}. ${CAN_BE_OPENED}`) : refusal;
   });
   const notes = [
     ['Taken for granted', grouped(assumed.map(({ pointer, reason }) => [fieldName(pointer, scenario), reason]))],
@@ -46,7 +48,7 @@ function grouped(pairs) {
     const names = whats.slice(0, NAMED).join(', ');
     return `${names}${whats.length > NAMED ? ` and ${whats.length - NAMED} more` : ''} (${reason})`;
   });
-  return all.length > REASONS ? [...all.slice(0, REASONS), `and for ${all.length - REASONS} more reasons`] : all;
+  return all.length > REASONS ? [...all.slice(0, REASONS), `and for ${all.length - REASONS === 1 ? 'one more reason' : `${all.length - REASONS} more reasons`}`] : all;
 }
 
 /** `/threats/3/base` as `base of threat 3`, by its name if it has one. */

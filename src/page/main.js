@@ -1,6 +1,6 @@
 // The page put together: what is chosen, planned, looked at, compared and taken away.
 
-import { Refused, Said, ask, onKeyNeeded, send } from './api.js';
+import { Refused, Said, UNREACHABLE, ask, onKeyNeeded, send } from './api.js';
 import { Again } from './again.js';
 import { cameraOf } from './camera.js';
 import { Chart } from './chart.js';
@@ -15,7 +15,7 @@ import { axes, isGeodetic, written } from './frame.js';
 import { readFile } from './import.js';
 import { askForKey } from './key.js';
 import { keepOrder } from './narrow.js';
-import { attempt, hold, over, say, tell } from './notice.js';
+import { attempt, hold, over, say, tell, untell } from './notice.js';
 import { OTHERS, onSchemeChange, palette } from './palette.js';
 import { Plans } from './plans.js';
 import { onPrint } from './print.js';
@@ -92,9 +92,10 @@ const editor = new Editor(by('scenario'), draft, {
   },
   addCorner: (index) => {
     const pointer = `/threats/${index}/vertices`;
-    const { vertices } = draft.document.threats[index];
-    const [a, b] = [vertices[0], vertices.at(-1)].map(stage.frame.to);
+    const { vertices = [] } = draft.document.threats[index];
     const [first, second] = axes(draft.document);
+    const known = [vertices[0], vertices.at(-1)].filter((vertex) => Number.isFinite(vertex?.[first]) && Number.isFinite(vertex?.[second]));
+    const [a, b] = known.length === 2 ? known.map(stage.frame.to) : [stage.middle(), stage.middle()];
     const middle = written(draft.document, stage.frame.from({ x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, z: 0 }));
     draft.set(pointer, [...vertices, { [first]: middle[first], [second]: middle[second] }]);
   },
@@ -248,7 +249,10 @@ function heard(plan, what) {
     if (lost) hold(LOST, 'note');
     else over(LOST);
     if (plan.lostBecause) tell(plan.lostBecause, 'note');
-    if (plan.connected) say('Connected again.');
+    if (plan.connected) {
+      untell(UNREACHABLE);
+      say('Connected again.');
+    }
   }
   if (what === 'status' && plan.status?.status === 'running' && running !== plan) {
     running = plan;

@@ -19,6 +19,9 @@ export function tell(text, kind = 'bad', act = null) {
   if (text) say(text);
 }
 
+/** Takes away what was told, if it was this. */
+export function untell(text) { if (told?.[0] === text) tell(''); }
+
 /** Shows and says what is so until it is `over`, beside what is told meanwhile. */
 export function hold(text, kind) {
   if (lasting.has(text)) return;

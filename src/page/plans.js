@@ -80,7 +80,7 @@ export class Plans {
   }
 
   #row(plan, shown, color) {
-    const name = plan.name || 'unnamed';
+    const name = plan.name?.trim() || 'unnamed';
     const tick = el('input', { type: 'checkbox', checked: Boolean(color), disabled: shown, data: { key: `lay ${plan.id}` }, 'aria-label': `Lay ${name} over`, onchange: () => this.acts.compare(plan, tick.checked) });
     if (color) tick.style.accentColor = color;
     const state = plan.status === 'running' ? `running, ${number(plan.progress * 100, 0)} %`
@@ -99,7 +99,7 @@ export class Plans {
     const active = ['queued', 'running'].includes(plan.status);
     const why = active ? 'It has not ended. Its search is stopped, and the best route so far is lost, for everybody who has its link.'
       : 'Its scenario and its result are lost, for everybody who has its link. This cannot be undone.';
-    if (!(await sure(`Remove “${plan.name || 'unnamed'}”?`, why, active ? 'Stop and remove' : 'Remove'))) return;
+    if (!(await sure(`Remove “${plan.name?.trim() || 'unnamed'}”?`, why, active ? 'Stop and remove' : 'Remove'))) return;
     try {
       await send(`/plans/${plan.id}`, { method: 'DELETE' });
       this.acts.removed(plan.id);

@@ -109,7 +109,13 @@ export class Stage {
     const position = this.draft.document[end];
     if (!Number.isFinite(position?.[third])) return 0;
     const { x, y, z } = this.frame.to(position);
-    return Number.isFinite(x) ? Math.max(0, z - this.ground.at(x, y)) : 0;
+    if (!Number.isFinite(x) || z <= (this.ground.around?.(x, y) ?? -Infinity)) return 0;
+    return Math.max(0, z - this.ground.at(x, y));
+  }
+
+  /** So high above ground at a place; no lower than the ground is drawn around it, which between its nodes is not known. */
+  heightAt({ x, y }, above) {
+    return Math.max(this.ground.at(x, y) + above, this.ground.around?.(x, y) ?? -Infinity);
   }
 
   /** What the service knows of a dataset's ground, so that it can be drawn: under the area of a validated scenario, which the draft need not have. */

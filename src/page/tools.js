@@ -13,7 +13,7 @@ const TOOLS = [
   ['start', 'Start', 'Click on the ground to place the start.', 'Tap the ground to place the start.'],
   ['target', 'Target', 'Click on the ground to place the target.', 'Tap the ground to place the target.'],
   ['cylinder', 'Cylinder', 'Click on the ground to place a round threat; drag its dots for its radii.', 'Tap the ground to place a round threat; drag its dots for its radii.'],
-  ['polygon', 'Polygon', 'Click the corners one after another; Enter or a click on the first one closes it, Escape gives up.',
+  ['polygon', 'Polygon', 'Click the corners one after another; Enter, a double click or a click on the first one closes it, Escape gives up.',
     'Tap the corners one after another; a tap on the first one closes it, Look gives up.'],
 ];
 /** What a tool says, to fingers or to a mouse. */
@@ -108,8 +108,8 @@ export class Tools {
       const position = draft.document?.[end];
       if (!axes(draft.document).every((axis) => Number.isFinite(position?.[axis]))) return [];
       const place = stage.frame.to(position);
-      const above = place.z - stage.ground.at(place.x, place.y);
-      return [{ place, move: (to) => this.#put(`/${end}`, { ...to, z: stage.ground.at(to.x, to.y) + above }, true) }];
+      const above = stage.heightAbove(end);
+      return [{ place, move: (to) => this.#put(`/${end}`, { ...to, z: stage.heightAt(to, above) }, true) }];
     });
   }
 
@@ -176,7 +176,10 @@ export class Tools {
     this.#drags += 1;
     if (this.#tool === 'polygon') {
       const first = this.#corners[0] && this.world.onScreen(this.#corners[0]);
+      const last = this.#corners.length > 1 && this.world.onScreen(this.#corners.at(-1));
       if (first && Math.hypot(first.x - px, first.y - py) <= near) this.#close();
+      // The second click of two in the same place.
+      else if (last && Math.hypot(last.x - px, last.y - py) <= STILL_PX) this.#close();
       else {
         this.#corners.push(place);
         this.show();
@@ -184,13 +187,17 @@ export class Tools {
       return;
     }
     if (this.#tool === 'cylinder') this.stage.addThreat('cylinder', [place]);
-    else this.#put(`/${this.#tool}`, { ...place, z: place.z + this.stage.heightAbove(this.#tool) }, true);
+    else this.#put(`/${this.#tool}`, { ...place, z: this.stage.heightAt(place, this.stage.heightAbove(this.#tool)) }, true);
     this.draft.rest();
     this.use('look');
   }
 
   #close() {
-    if (this.#corners.length >= 3) this.stage.addThreat('polygon', this.#corners);
+    if (this.#corners.length < 3) {
+      this.say('A polygon takes three corners.');
+      return;
+    }
+    this.stage.addThreat('polygon', this.#corners);
     this.use('look');
   }
 }

@@ -40,6 +40,8 @@ test('files are opened and dropped: a scenario, GeoJSON, KML', async () => {
   await drop(page, 'map.kml', kml, '');
   await page.waitForFunction(() => globalThis.noctule.document().start?.lat === 36.49);
   await drawn(page, 1);
+  await drop(page, 'map.kmz', 'PK\u0003\u0004', '');
+  await page.waitForFunction(() => /map\.kmz is a zip archive/.test(document.getElementById('notice').textContent));
   await drop(page, 'broken.json', '{"start": ', 'application/json');
   await page.waitForSelector('#notice:not([hidden])');
   assert.match(await page.textContent('#notice'), /broken\.json is no JSON/);
@@ -178,6 +180,80 @@ test('a scenario is drawn by hand, taken back and done again', async () => {
   await page.keyboard.press('Control+Shift+z');
   await drawn(page, 2);
   assert.deepEqual((await document_(page)).threats[0], moved);
+  await page.done();
+});
+
+test('undo across documents shows each as it is, and where it came from no longer', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  // Where the start is seen tells where the camera is.
+  const seen = () => page.evaluate(() => {
+    const { document, onScreen, toMetres } = globalThis.noctule;
+    const { x, y } = onScreen(toMetres(document().start));
+    return [Math.round(x), Math.round(y)];
+  });
+  await page.waitForFunction(() => globalThis.noctule.scene().ground.kind === 'mesh');
+  await settled(page);
+  const before = await seen();
+  await page.selectOption('#source', 'paper-1');
+  await drawn(page, 3);
+  await settled(page);
+  assert.notDeepEqual(await seen(), before);
+  await page.click('#undo');
+  await drawn(page, FIRST);
+  await settled(page);
+  assert.deepEqual(await seen(), before);
+  assert.equal(await page.inputValue('#source'), '');
+  // A step within a document leaves the camera where it is.
+  await fill(page, '/threats/0/radius', '61');
+  await page.locator('#undo').click();
+  assert.deepEqual(await seen(), before);
+  await page.done();
+});
+
+test('an area is left open again when its fields are emptied', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await page.selectOption('#source', 'paper-1');
+  await drawn(page, 3);
+  await page.evaluate(() => { for (const part of document.querySelectorAll('details')) part.open = true; });
+  for (const field of ['min/x', 'min/y', 'max/x', 'max/y']) await fill(page, `/area/${field}`, '');
+  assert.equal('area' in (await document_(page)), false);
+  await page.waitForSelector('.faults', { state: 'hidden' });
+  await fill(page, '/area/min/x', '-100');
+  assert.deepEqual((await document_(page)).area, { min: { x: -100 } });
+  await page.waitForSelector('.faults:not([hidden])');
+  await page.done();
+});
+
+test('a polygon without corners gets some again', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  const bare = { ...SMALL, threats: [{ kind: 'polygon', name: 'bare', vertices: [] }] };
+  await page.setInputFiles('#file', { name: 'bare.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(bare)) });
+  await page.waitForFunction(() => globalThis.noctule.document().name === 'small');
+  await page.evaluate(() => { for (const part of document.querySelectorAll('details')) part.open = true; });
+  for (const corners of [1, 2]) {
+    await page.getByRole('button', { name: 'Add a corner' }).click();
+    assert.equal((await document_(page)).threats[0].vertices.length, corners);
+  }
+  await page.done();
+});
+
+test('a double click closes a polygon, and two corners are none', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await page.click('text=Empty');
+  await drawn(page, 0);
+  await page.click('[data-tool=polygon]');
+  const places = [];
+  for (const [x, y] of [[-400, 200], [-250, 200], [-250, 350]]) places.push(await groundPoint(page, x, y));
+  for (const { x, y } of places.slice(0, 2)) await page.mouse.click(x, y);
+  await page.keyboard.press('Enter');
+  assert.match(await page.textContent('#hint'), /three corners/);
+  await page.mouse.dblclick(places[2].x, places[2].y);
+  await drawn(page, 1);
+  assert.equal((await document_(page)).threats[0].vertices.length, 3);
   await page.done();
 });
 

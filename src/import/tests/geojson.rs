@@ -329,3 +329,34 @@ fn what_is_said_of_many_shapes_is_short() {
     let many: serde_json::Map<_, _> = (0..10_000).map(|n| (format!("n{n}"), json!(n))).collect();
     check(many.into(), "9990 more");
 }
+
+/// What ogr2ogr makes of a file of placemarks.
+#[test]
+fn names_in_capitals_points_of_one_and_other_names_of_wgs_84() {
+    let point = |name: &str, lon: f64| {
+        feature(
+            json!({"Name": name, "NOTE": "seen"}),
+            json!({"type": "MultiPoint", "coordinates": [[lon, 47.3, 500]]}),
+        )
+    };
+    let both = feature(
+        json!({"name": "Other"}),
+        json!({"type": "MultiPoint", "coordinates": [[8.5, 47.3], [8.6, 47.3]]}),
+    );
+    let file = json!({
+        "type": "FeatureCollection",
+        "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::4326"}},
+        "features": [point("start", 8.5), point("TARGET", 8.6), both],
+    });
+    let found = convert(file.to_string().as_bytes(), Syntax::Json).expect("a scenario");
+    assert_eq!(found.scenario["start"]["lon"], 8.5);
+    assert_eq!(found.scenario["target"]["lon"], 8.6);
+    assert_eq!(
+        unused(&found),
+        [
+            "/features/0: said and not used: NOTE",
+            "/features/1: said and not used: NOTE",
+            "/features/2: many points in one: each must be a feature of its own",
+        ]
+    );
+}

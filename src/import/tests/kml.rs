@@ -84,3 +84,34 @@ fn a_polygon_cut_at_180_degrees_is_one_again() {
             corner(2.0, -180.0)], "margin": 20.0, "base": null, "top": null}])
     );
 }
+
+#[test]
+fn heights_of_polygons_that_are_not_read_are_told() {
+    let town = |mode: &str, data: &str| {
+        let ends = ["start", "target"].map(|end| {
+            let lon = if end == "start" { 8.5 } else { 8.6 };
+            format!("<Placemark><name>{end}</name><Point><altitudeMode>absolute</altitudeMode><coordinates>{lon},47.3,500</coordinates></Point></Placemark>")
+        });
+        let kml = format!(
+            "<kml xmlns=\"http://www.opengis.net/kml/2.2\"><Document>{}<Placemark><name>town</name>{data}<Polygon>{mode}\
+             <outerBoundaryIs><LinearRing><coordinates>8.51,47.31,30 8.52,47.31,30 8.52,47.32,30 8.51,47.31,30</coordinates>\
+             </LinearRing></outerBoundaryIs></Polygon></Placemark></Document></kml>",
+            ends.concat()
+        );
+        let found = convert(kml.as_bytes(), Syntax::of(kml.as_bytes())).expect("a scenario");
+        unused(&found)
+    };
+    let top = "<ExtendedData><Data name=\"top\"><value>530</value></Data></ExtendedData>";
+    for mode in ["absolute", "relativeToGround"] {
+        let mode = format!("<altitudeMode>{mode}</altitudeMode>");
+        assert_eq!(
+            town(&mode, ""),
+            [
+                "line 1: town: the heights of a polygon: it is kept clear of at any height, unless its data have a base or a top"
+            ]
+        );
+        assert!(town(&mode, top).is_empty());
+    }
+    assert!(town("<altitudeMode>clampToGround</altitudeMode>", "").is_empty());
+    assert!(town("", "").is_empty());
+}

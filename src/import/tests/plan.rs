@@ -304,3 +304,32 @@ fn a_long_value_in_place_of_an_altitude_is_told_once_and_shortened() {
     let begin = "the start, /mission/items/0, counts from home, whose altitude is \"xxx";
     assert!(text.starts_with(begin) && text.len() < 400, "{text}");
 }
+
+#[test]
+fn a_landing_is_at_the_altitude_that_it_names() {
+    let landed = |frame: u8, alt: Value| {
+        let item = |command: u16, frame: u8, lat: f64, alt: Value| json!({"type": "SimpleItem", "command": command, "frame": frame, "params": [0, 0, 0, null, lat, 8.5, alt]});
+        let items = [item(22, 3, 47.3, json!(30)), item(21, frame, 47.4, alt)];
+        let mission = json!({"plannedHomePosition": [47.3, 8.5, 480], "items": items});
+        let plan = json!({"fileType": "Plan", "mission": mission}).to_string();
+        let found = convert(plan.as_bytes(), Syntax::Json).expect("a scenario");
+        assert_eq!(found.scenario["start"]["alt"], 480.0);
+        found.scenario["target"]["alt"].clone()
+    };
+    assert_eq!(landed(3, json!(-411.5)), 68.5);
+    assert_eq!(landed(0, json!(70)), 70.0);
+    for unsaid in [json!(0), json!(null)] {
+        assert_eq!(landed(3, unsaid.clone()), 480.0);
+        assert_eq!(landed(0, unsaid), 480.0);
+    }
+}
+
+#[test]
+fn a_mission_without_positions_is_refused_in_words_of_its_own() {
+    let plan = json!({"fileType": "Plan", "mission": {"plannedHomePosition": [47.3, 8.5, 480], "items": []}});
+    let refused = convert(plan.to_string().as_bytes(), Syntax::Json).expect_err("it has no ends");
+    assert_eq!(
+        refused.to_string(),
+        "the mission has no item with a position: its first and its last one make start and target"
+    );
+}

@@ -4,6 +4,7 @@
 //! rows at a time, because some writers make the whole file one strip.
 
 mod heights;
+mod lzw;
 mod mask;
 mod place;
 mod samples;

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use tiff_reader::{ByteOrder, RasterLayout, TiffFile};
 
+use super::lzw::{self, Lzw};
 use super::mask::{Band, mask};
 use super::{LARGEST_BLOCK, malformed, refusal, tiff, unsupported};
 use crate::terrain::dem::raster::{NoData, Span, Visit, Wanted};
@@ -31,6 +32,7 @@ pub(in crate::terrain::dem) struct Layout {
     blocks: Arc<[[u64; 2]]>,
     /// Uncompressed strips.
     plain: bool,
+    lzw: Option<Lzw>,
     /// Says which samples have no data.
     mask: Option<Box<Layout>>,
 }
@@ -137,6 +139,12 @@ fn blocks(
         && ifd.fill_order() == 1
         && shape.predictor == 1
         && shape.bits_per_sample >= 8;
+    let is_lzw = compression == lzw::SCHEME && ifd.fill_order() == 1 && shape.bits_per_sample >= 8;
+    let lzw = is_lzw.then(|| Lzw {
+        predictor: shape.predictor,
+        bits: shape.bits_per_sample,
+        order: file.byte_order(),
+    });
     let bytes = block[0]
         .saturating_mul(block[1])
         .saturating_mul(shape.bytes_per_sample);
@@ -171,8 +179,24 @@ fn blocks(
         block,
         blocks: blocks.into(),
         plain,
+        lzw,
         mask: None,
     })
+}
+
+/// The file from which packed strips and tiles come.
+enum Source {
+    Tiff(Box<TiffFile>),
+    Lzw(File, Lzw),
+}
+
+impl Source {
+    fn open(path: &Path, lzw: Option<Lzw>) -> Result<Self, DemError> {
+        Ok(match lzw {
+            Some(lzw) => Self::Lzw(File::open(path)?, lzw),
+            None => Self::Tiff(Box::new(tiff(path)?)),
+        })
+    }
 }
 
 impl Layout {
@@ -221,7 +245,7 @@ impl Layout {
         if self.plain {
             return self.read_plain(path, span, wanted, visit);
         }
-        let file = tiff(path)?;
+        let mut source = Source::open(path, self.lzw)?;
         let [width, height] = self.block;
         let across = self.columns.div_ceil(width);
         let mut samples = Vec::with_capacity(width.min(self.columns));
@@ -237,13 +261,18 @@ impl Layout {
                     (row..row + rows).try_for_each(|row| visit(row, column, &samples))?;
                     continue;
                 }
-                let bytes = file
-                    .read_window_bytes(self.image, row, column, rows, columns)
-                    .map_err(|error| refusal(&error))?;
-                for (idx, bytes) in bytes
-                    .chunks_exact(columns * self.sample.bytes())
-                    .enumerate()
-                {
+                let bytes = match &mut source {
+                    Source::Tiff(file) => file
+                        .read_window_bytes(self.image, row, column, rows, columns)
+                        .map_err(|error| refusal(&error))?,
+                    Source::Lzw(file, lzw) => {
+                        let block = self.blocks[block_row * across + block_column];
+                        lzw.read(file, block, (rows, width * self.sample.bytes()))?
+                    }
+                };
+                let columns_bytes = columns * self.sample.bytes();
+                for (idx, bytes) in bytes.chunks_exact(bytes.len() / rows).enumerate() {
+                    let bytes = &bytes[..columns_bytes];
                     self.convert(bytes, cfg!(target_endian = "big"), &mut samples);
                     visit(row + idx, column, &samples)?;
                 }

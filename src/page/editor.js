@@ -170,7 +170,8 @@ export class Editor {
       el('div', { class: 'field' }, el('label', {}, el('span', { class: 'name' }, 'Start from'), choose)),
       // Its ring is drawn round what comes after it.
       file, el('label', { class: 'button', for: 'file' }, 'Open file…'),
-      el('button', { type: 'button', id: 'empty', onclick: () => this.acts.blank() }, 'Empty'));
+      el('button', { type: 'button', id: 'empty', onclick: () => this.acts.blank(false) }, 'Empty'),
+      el('button', { type: 'button', id: 'empty-in-degrees', onclick: () => this.acts.blank(true) }, 'Empty, in degrees'));
   }
 
   #ends(document) {
@@ -250,7 +251,9 @@ export class Editor {
 
   #ground(document) {
     const terrain = document.terrain ?? { kind: 'flat' };
-    const kinds = [['flat', 'Flat'], ['peaks', 'Mountains, analytic'], ...(terrain.kind === 'grid' ? [['grid', 'Grid of elevations']] : []), ['dataset', 'Dataset of the service']];
+    const kinds = [['flat', 'Flat'], ['peaks', 'Mountains, analytic'], ...(terrain.kind === 'grid' ? [['grid', 'Grid of elevations']] : []),
+      // Only degrees say where on earth a dataset's ground is wanted.
+      ...(isGeodetic(document) || terrain.kind === 'dataset' ? [['dataset', 'Dataset of the service']] : [])];
     const made = {
       flat: () => ({ kind: 'flat', elevation: 0 }),
       peaks: () => ({ kind: 'peaks', base: 0, peaks: [] }),

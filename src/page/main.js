@@ -11,10 +11,11 @@ import { onDrop } from './dropped.js';
 import { Editor } from './editor.js';
 import { showFigures, showNone, verdict } from './figures.js';
 import { Followed } from './followed.js';
-import { axes, isGeodetic, written } from './frame.js';
+import { isGeodetic } from './frame.js';
 import { readFile } from './import.js';
 import { askForKey } from './key.js';
 import { keepOrder } from './narrow.js';
+import { EMPTY, additions, emptyInDegrees } from './new.js';
 import { attempt, hold, over, say, tell, untell } from './notice.js';
 import { OTHERS, onSchemeChange, palette } from './palette.js';
 import { Plans } from './plans.js';
@@ -30,11 +31,6 @@ import { Tools } from './tools.js';
 import { onUndoKeys } from './undo.js';
 import { guard, isKept, keep } from './unsaved.js';
 import { faultText, metres, number } from './words.js';
-
-const EMPTY = {
-  name: 'untitled', frame: 'local', start: { x: 100, y: 100, z: 50 }, target: { x: 900, y: 900, z: 50 },
-  area: { min: { x: 0, y: 0 }, max: { x: 1000, y: 1000 } }, threats: [], terrain: { kind: 'flat', elevation: 0 }, altitude: { min: 20, max: 120 },
-};
 
 const draft = new Draft();
 let busy = false;
@@ -78,34 +74,13 @@ const again = new Again(by('watch'), (iteration, trail) => {
 const editor = new Editor(by('scenario'), draft, {
   load: (name) => attempt(() => load(name)),
   open: (file) => attempt(() => openFile(file)),
-  blank: () => {
+  blank: (inDegrees) => {
     wishes += 1;
     stepFrom(draft.document);
-    begin(EMPTY);
+    begin(inDegrees ? emptyInDegrees(draft.document, stage.frame) : EMPTY);
   },
   select: (index) => stage.selected !== index && stage.select(index),
-  add: (kind) => {
-    const { x, y } = stage.middle();
-    const { min, max } = stage.ground.extent;
-    const size = (max.x - min.x) / 16;
-    stage.addThreat(kind, kind === 'polygon' ? [{ x: x - size, y: y - size }, { x: x + size, y: y - size }, { x, y: y + size }] : [{ x, y }]);
-  },
-  addCorner: (index) => {
-    const pointer = `/threats/${index}/vertices`;
-    const { vertices = [] } = draft.document.threats[index];
-    const [first, second] = axes(draft.document);
-    const known = [vertices[0], vertices.at(-1)].filter((vertex) => Number.isFinite(vertex?.[first]) && Number.isFinite(vertex?.[second]));
-    const [a, b] = known.length === 2 ? known.map(stage.frame.to) : [stage.middle(), stage.middle()];
-    const middle = written(draft.document, stage.frame.from({ x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, z: 0 }));
-    draft.set(pointer, [...vertices, { [first]: middle[first], [second]: middle[second] }]);
-  },
-  addPeak: () => {
-    const { peaks = [] } = draft.document.terrain;
-    const { x, y } = stage.middle();
-    const [first, second] = axes(draft.document);
-    const center = written(draft.document, stage.frame.from({ x, y, z: 0 }));
-    draft.set('/terrain/peaks', [...peaks, { center: { [first]: center[first], [second]: center[second] }, height: 100, spread: { x: 100, y: 100 } }]);
-  },
+  ...additions(draft, stage),
 });
 const plans = new Plans(by('plans'), {
   open: (status) => attempt(() => open(status.id)),

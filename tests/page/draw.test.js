@@ -211,6 +211,30 @@ test('undo across documents shows each as it is, and where it came from no longe
   await page.done();
 });
 
+test('a scenario in degrees is drawn from nothing, and its route is taken to a ground station', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await page.selectOption('#source', 'paper-1');
+  await drawn(page, 3);
+  const grounds = () => page.locator('[data-pointer="/terrain"] option').allTextContents();
+  assert.ok(!(await grounds()).includes('Dataset of the service'), 'metres are nowhere on earth');
+  await page.click('#empty-in-degrees');
+  await drawn(page, 0);
+  const { frame, start, target } = await document_(page);
+  assert.deepEqual([frame, start.lat < target.lat, start.lon < target.lon], ['wgs84', true, true]);
+  assert.ok((await grounds()).includes('Dataset of the service'));
+  await page.waitForSelector('.faults', { state: 'hidden' });
+  await page.click('#plan');
+  await page.getByRole('button', { name: 'QGroundControl plan' }).waitFor();
+  // Where a map is open, it begins there.
+  await fill(page, '/start/lat', '47.5');
+  await fill(page, '/target/lat', '47.51');
+  await page.click('#empty-in-degrees');
+  await drawn(page, 0);
+  assert.ok(Math.abs((await document_(page)).start.lat - 47.5) < 0.02);
+  await page.done();
+});
+
 test('an area is left open again when its fields are emptied', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);

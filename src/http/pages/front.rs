@@ -69,7 +69,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 53] = [
+static FILES: [File; 54] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -96,6 +96,7 @@ static FILES: [File; 53] = [
     file!("labels.js"),
     file!("main.js"),
     file!("narrow.js"),
+    file!("new.js"),
     file!("notice.js"),
     file!("palette.js"),
     file!("plans.js"),

@@ -1,0 +1,50 @@
+// What buttons make anew: scenarios with nothing in them, and threats, corners and mountains for those there are.
+
+import { axes, isGeodetic, written } from './frame.js';
+
+export const EMPTY = {
+  name: 'untitled', frame: 'local', start: { x: 100, y: 100, z: 50 }, target: { x: 900, y: 900, z: 50 },
+  area: { min: { x: 0, y: 0 }, max: { x: 1000, y: 1000 } }, threats: [], terrain: { kind: 'flat', elevation: 0 }, altitude: { min: 20, max: 120 },
+};
+
+/** Where no map has been open: in the middle of the shipped ones. */
+const SOMEWHERE = { lat: 36.59, lon: -84.25 };
+/** Degrees to the north of a way of some 400 m. */
+const AWAY = 0.0036;
+
+/** A scenario in degrees with nothing in it, where `document` is, whose places `frame` turns to metres. */
+export function emptyInDegrees(document, frame) {
+  const { lat, lon } = isGeodetic(document) && frame ? frame.from({ x: 0, y: 0, z: 0 }) : SOMEWHERE;
+  const [north, east] = [AWAY, AWAY / Math.max(0.01, Math.cos((lat * Math.PI) / 180))];
+  const empty = { name: 'untitled', frame: 'wgs84', altitude_datum: 'msl' };
+  const place = (sign) => written(empty, { lat: lat + sign * north, lon: lon + sign * east, alt: 50 });
+  return { ...empty, start: place(-1), target: place(1), threats: [], terrain: { kind: 'flat', elevation: 0 }, altitude: { min: 20, max: 120 } };
+}
+
+/** What adds to the draft: `add(kind)` a threat, `addCorner(threat)`, and `addPeak()`. */
+export function additions(draft, stage) {
+  const middleBetween = (a, b) => {
+    const [first, second] = axes(draft.document);
+    const middle = written(draft.document, stage.frame.from({ x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, z: 0 }));
+    return { [first]: middle[first], [second]: middle[second] };
+  };
+  return {
+    add: (kind) => {
+      const { x, y } = stage.middle();
+      const { min, max } = stage.ground.extent;
+      const size = (max.x - min.x) / 16;
+      stage.addThreat(kind, kind === 'polygon' ? [{ x: x - size, y: y - size }, { x: x + size, y: y - size }, { x, y: y + size }] : [{ x, y }]);
+    },
+    addCorner: (index) => {
+      const { vertices = [] } = draft.document.threats[index];
+      const known = [vertices[0], vertices.at(-1)].filter((vertex) => axes(draft.document).slice(0, 2).every((axis) => Number.isFinite(vertex?.[axis])));
+      const ends = known.length === 2 ? known.map(stage.frame.to) : [stage.middle(), stage.middle()];
+      draft.set(`/threats/${index}/vertices`, [...vertices, middleBetween(...ends)]);
+    },
+    addPeak: () => {
+      const { peaks = [] } = draft.document.terrain;
+      const middle = stage.middle();
+      draft.set('/terrain/peaks', [...peaks, { center: middleBetween(middle, middle), height: 100, spread: { x: 100, y: 100 } }]);
+    },
+  };
+}

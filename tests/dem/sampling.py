@@ -44,6 +44,12 @@ def make():
     yield "degrees, area, int32, deflate", SOURCE, "EPSG:4326"
     yield "degrees, point, int16, LZW tiles", translated(
         "point.tif", *point, "-ot", "Int16", *tiled, "-co", "COMPRESS=LZW", "-co", "PREDICTOR=2"), "EPSG:4326"
+    # One of its tiles unpacks to exactly as many bytes as a reader's buffer may have.
+    yield "degrees, area, int32, LZW tiles of 64", translated(
+        "small.tif", "-co", "TILED=YES", "-co", "BLOCKXSIZE=64", "-co", "BLOCKYSIZE=64", "-co", "COMPRESS=LZW", "-co", "PREDICTOR=2"
+    ), "EPSG:4326"
+    yield "degrees, area, float32, LZW strips", translated(
+        "strips.tif", "-ot", "Float32", "-co", "COMPRESS=LZW", "-co", "PREDICTOR=3"), "EPSG:4326"
     utm_file = warped("utm.tif", *utm, "-ot", "Float32", *tiled, "-co", "COMPRESS=DEFLATE", "-co", "PREDICTOR=3")
     yield "UTM, area, float32, deflate tiles", utm_file, "EPSG:32616"
     run("gdal_translate", "-q", *point, "-co", "BIGTIFF=YES", "-co", "ENDIANNESS=BIG", utm_file, SCRATCH / "utm-point.tif")

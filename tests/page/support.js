@@ -130,7 +130,9 @@ export const document_ = (page) => page.evaluate(() => globalThis.noctule.docume
 export async function choose(page, name, values = {}) {
   const drawnBefore = (await scene(page)).frames.count;
   await page.selectOption('#source', name);
-  await page.waitForFunction((before) => globalThis.noctule.scene().frames.count > before, drawnBefore);
+  // What is drawn may still be the scenario before, whose fields would be filled in vain.
+  const title = await page.evaluate(async (wanted) => (await (await fetch(`/scenarios/${wanted}`)).json()).name, name);
+  await page.waitForFunction(([before, wanted]) => globalThis.noctule.document().name === wanted && globalThis.noctule.scene().frames.count > before, [drawnBefore, title]);
   for (const [pointer, value] of Object.entries(values)) await fill(page, pointer, value);
 }
 

@@ -80,7 +80,7 @@ export class Draft extends EventTarget {
     this.#now = from.pop();
     this.#last = null;
     this.#number = this.#numbers.get(this.#now);
-    this.#tell(this.#number === number ? 'stepped' : 'replaced', null, true);
+    this.#tell(this.#number === number ? 'stepped' : 'replaced');
   }
 
   #become(document, gesture) {
@@ -94,7 +94,7 @@ export class Draft extends EventTarget {
     this.#numbers.set(document, this.#number);
   }
 
-  #tell(why, pointer, back = false) {
-    this.dispatchEvent(new CustomEvent('change', { detail: { why, pointer, back } }));
+  #tell(why, pointer) {
+    this.dispatchEvent(new CustomEvent('change', { detail: { why, pointer } }));
   }
 }

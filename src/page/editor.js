@@ -31,11 +31,12 @@ export class Editor {
     this.draft = draft;
     this.acts = acts;
     this.form = new Form(root, draft);
-    draft.addEventListener('change', ({ detail: { why, back } }) => {
+    draft.addEventListener('change', ({ detail: { why } }) => {
       const isSame = why === 'edited' || why === 'stepped';
-      if (!isSame) this.#corners.clear();
-      // To another document, or back to one, of which only the document is known.
-      if (why === 'replaced' && back) this.from('');
+      if (!isSame) {
+        this.#corners.clear();
+        this.from('');
+      }
       // What another document leaves open, the service has yet to say.
       this.show(isSame ? undefined : null);
     });

@@ -29,7 +29,7 @@ export async function readFile(file) {
   }
   const type = kml ? 'application/vnd.google-earth.kml+xml' : 'application/json';
   // As it is: what its bytes mean is for the service to say.
-  const { scenario, assumed, unused } = await ask('/scenarios:convert', { method: 'POST', body: new Blob([file]), type }).catch((refusal) => {
+  const { scenario, assumed, unused } = await ask('/scenarios:convert', { method: 'POST', body: file, type }).catch((refusal) => {
     throw [400, 422].includes(refusal.status) ? new Said(`${file.name} holds no scenario: ${refusal.message.replace(/\.$/, '')}. ${CAN_BE_OPENED}`) : refusal;
   });
   const notes = [

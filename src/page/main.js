@@ -107,7 +107,6 @@ function begin(document_, plan = null, kept = true) {
   // What was laid over one scenario says nothing of another.
   if (!plan) clearCompared();
   show(plan);
-  editor.from('');
   draft.replace({ ...document_, planner: { ...document_.planner, warm_start: undefined } });
   if (kept) keep(draft.document);
   planned = plan ? draft.document : null;

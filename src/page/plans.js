@@ -9,6 +9,9 @@ const LOOK_MS = 2000;
 const PAGE = 20;
 const STATES = ['queued', 'running', 'succeeded', 'failed', 'cancelled'];
 
+/** What a plan is called; blanks name nothing. */
+const nameOf = (plan) => plan.name?.trim() || 'unnamed';
+
 export class Plans {
   #cursor = null;
   #next = null;
@@ -80,7 +83,7 @@ export class Plans {
   }
 
   #row(plan, shown, color) {
-    const name = plan.name?.trim() || 'unnamed';
+    const name = nameOf(plan);
     const tick = el('input', { type: 'checkbox', checked: Boolean(color), disabled: shown, data: { key: `lay ${plan.id}` }, 'aria-label': `Lay ${name} over`, onchange: () => this.acts.compare(plan, tick.checked) });
     if (color) tick.style.accentColor = color;
     const state = plan.status === 'running' ? `running, ${number(plan.progress * 100, 0)} %`
@@ -99,7 +102,7 @@ export class Plans {
     const active = ['queued', 'running'].includes(plan.status);
     const why = active ? 'It has not ended. Its search is stopped, and the best route so far is lost, for everybody who has its link.'
       : 'Its scenario and its result are lost, for everybody who has its link. This cannot be undone.';
-    if (!(await sure(`Remove “${plan.name?.trim() || 'unnamed'}”?`, why, active ? 'Stop and remove' : 'Remove'))) return;
+    if (!(await sure(`Remove “${nameOf(plan)}”?`, why, active ? 'Stop and remove' : 'Remove'))) return;
     try {
       await send(`/plans/${plan.id}`, { method: 'DELETE' });
       this.acts.removed(plan.id);

@@ -77,6 +77,16 @@ pub fn squared_distance((a, b): (Point2, Point2), point: Point2) -> f64 {
     (point - (a + along * t)).norm_squared()
 }
 
+/// Where on the first of two segments they cross, as a share of it; `None` where they do not, or only touch.
+#[must_use]
+pub fn crossing((a, b): (Point2, Point2), (c, d): (Point2, Point2)) -> Option<f64> {
+    let (one, other) = (b - a, d - c);
+    let (a_off, b_off) = (other.perp(&(a - c)), other.perp(&(b - c)));
+    let (c_off, d_off) = (one.perp(&(c - a)), one.perp(&(d - a)));
+    let apart = |p: f64, q: f64| (p > 0.0 && q < 0.0) || (p < 0.0 && q > 0.0);
+    (apart(a_off, b_off) && apart(c_off, d_off)).then(|| a_off / (a_off - b_off))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::Vector2;
 
-use crate::geometry::Point2;
+use crate::geometry::{Point2, ring};
 
 /// Turns within this many radians of a whole circle are zero turns with rounding.
 const NO_TURN: f64 = 1e-9;
@@ -199,7 +199,7 @@ pub(super) fn nearest_points(
     (a, b): (Point2, Point2),
     (c, d): (Point2, Point2),
 ) -> (Point2, Point2) {
-    if let Some(shares) = crossing((a, b), (c, d)) {
+    if let Some(shares) = ring::crossing((a, b), (c, d)) {
         let at = a + (b - a) * shares;
         return (at, at);
     }
@@ -231,15 +231,6 @@ pub(super) fn nearest_points(
 pub(super) fn segment_segment(one: (Point2, Point2), other: (Point2, Point2)) -> f64 {
     let (p, q) = nearest_points(one, other);
     (p - q).norm()
-}
-
-/// Where on the first of two segments they cross, as a share of it; `None` where they do not, or only touch.
-pub(super) fn crossing((a, b): (Point2, Point2), (c, d): (Point2, Point2)) -> Option<f64> {
-    let (one, other) = (b - a, d - c);
-    let (a_off, b_off) = (other.perp(&(a - c)), other.perp(&(b - c)));
-    let (c_off, d_off) = (one.perp(&(c - a)), one.perp(&(d - a)));
-    let apart = |p: f64, q: f64| (p > 0.0 && q < 0.0) || (p < 0.0 && q > 0.0);
-    (apart(a_off, b_off) && apart(c_off, d_off)).then(|| a_off / (a_off - b_off))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
-use super::arc::{Arc, crossing, point_segment, segment_segment};
+use super::arc::{Arc, point_segment, segment_segment};
 use super::outline::{Outline, OutlineShape};
 use crate::geometry::{Point2, Rect, ring};
 use crate::scenario::Scenario;
@@ -335,7 +335,7 @@ impl Obstacles {
             let way = b - a;
             way.perp(&(point - a)).abs() / way.norm().max(f64::MIN_POSITIVE)
         };
-        crossing(one, other).is_some()
+        ring::crossing(one, other).is_some()
             && off(other, one.0) > self.touch
             && off(other, one.1) > self.touch
             && off(one, other.0) > self.touch

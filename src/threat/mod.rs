@@ -96,6 +96,15 @@ impl Threat {
         })
     }
 
+    /// The shares of `leg` between which lies all of it that is within the boundary, at any height; `None` if it stays
+    /// outside.
+    pub(crate) fn span(&self, leg: &Segment) -> Option<(f64, f64)> {
+        match &self.shape {
+            Shape::Cylinder(cylinder) => leg.within(cylinder.center, cylinder.radius),
+            Shape::Polygon(polygon) => polygon.span(leg),
+        }
+    }
+
     /// Depth and exposure together; returns zeros quickly if `leg` is outside the soft zone.
     #[must_use]
     pub fn encounter(&self, leg: &Segment) -> Encounter {

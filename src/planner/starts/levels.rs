@@ -1,12 +1,10 @@
 //! The heights at which a place is worth flying over: in the middle of the band, and where a threat can be passed above
 //! or below, just clear of it.
 
+use super::over::TOUCH;
 use super::{lifted, steepest};
 use crate::geometry::{Point2, Point3, Vector2};
 use crate::scenario::Scenario;
-
-/// A leg at the height of a base touches it; metres below, it does not.
-const TOUCH: f64 = 1e-3;
 
 /// Additional clearance from tops and bases, as a share of the band: a leg may slope by this much over a threat.
 const CLEAR: f64 = 0.02;

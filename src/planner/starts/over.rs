@@ -1,9 +1,15 @@
-//! Threats that can be passed above or below.
+//! Threats that can be passed above or below, and routes that pass them so.
 
+use super::steepest;
 use crate::cost::Model;
 use crate::geometry::{Point2, Point3, Segment};
+use crate::optimizer::Fitness;
+use crate::planner::price::price;
 use crate::scenario::Scenario;
 use crate::threat::Threat;
+
+/// A leg at the height of a base touches it; metres below, it does not.
+pub(super) const TOUCH: f64 = 1e-3;
 
 /// Whether the altitude band reaches above the top of `threat`, or below its base, somewhere over it.
 pub(super) fn passable(scenario: &Scenario, threat: &Threat) -> bool {
@@ -32,37 +38,243 @@ fn heights(scenario: &Scenario, threat: &Threat) -> (f64, f64) {
     (lowest, highest)
 }
 
-/// Raise, or lower, the free waypoints of legs that run through passable threats until they pass.
-pub(super) fn lift(model: &Model, route: &mut [Point3]) {
+/// `route` with additional waypoints, and others moved up or down, where legs run through threats that can be passed
+/// above or below.
+pub(super) fn lifted_over(model: &Model, mut route: Vec<Point3>) -> Vec<Point3> {
     let scenario = model.scenario;
-    let last = route.len() - 1;
-    for threat in scenario
-        .threats
-        .iter()
-        .filter(|threat| passable(scenario, threat))
-    {
+    let threats = scenario.threats.iter();
+    for threat in threats.filter(|threat| passable(scenario, threat)) {
+        let mut leg = 0;
+        while leg + 1 < route.len() {
+            leg += 1 + pass(model, threat, &mut route, leg);
+        }
+    }
+    route
+}
+
+/// Lead the leg of `route` that begins with waypoint `first` past `threat`; returns how many waypoints are added to it.
+fn pass(model: &Model, threat: &Threat, route: &mut Vec<Point3>, first: usize) -> usize {
+    let leg = Segment {
+        a: route[first],
+        b: route[first + 1],
+    };
+    let is_through = threat.clearance(&leg).is_some_and(|clear| clear < 0.0);
+    let Some((from, to)) = is_through.then(|| threat.span(&leg)).flatten() else {
+        return 0;
+    };
+    let Some(level) = Level::past(model.scenario, threat, leg.at(0.5 * (from + to)).z) else {
+        return 0;
+    };
+    // Where a waypoint lies within the threat, it is moved itself.
+    for (idx, is_within) in [(first, from <= 0.0), (first + 1, to >= 1.0)] {
+        if is_within && idx > 0 && idx + 1 < route.len() {
+            route[idx].z = level.beyond(route[idx].z);
+        }
+    }
+    let [a, b] = [route[first], route[first + 1]];
+    let ways = level.ways(&Segment { a, b }, (from, to));
+    let priced = ways.into_iter().map(|way| {
+        let mut whole = vec![a];
+        whole.extend(&way);
+        whole.push(b);
+        (price(model, &whole), way)
+    });
+    let best = priced.min_by(|(one, _), (other, _): &(Fitness, _)| one.rank(other));
+    let way = best.map(|(_, way)| way).unwrap_or_default();
+    let added = way.len();
+    let onward = route.split_off(first + 1);
+    route.extend(way.into_iter().chain(onward));
+    level.reach(model.scenario, route, first, first + 1 + added);
+    added
+}
+
+/// The height at which a threat is passed.
+#[derive(Clone, Copy)]
+struct Level {
+    z: f64,
+    is_above: bool,
+}
+
+impl Level {
+    /// Above or below `threat`, whichever is nearer to `z`.
+    fn past(scenario: &Scenario, threat: &Threat, z: f64) -> Option<Self> {
         let (lowest, highest) = heights(scenario, threat);
-        for leg_idx in 0..last {
-            let leg = Segment {
-                a: route[leg_idx],
-                b: route[leg_idx + 1],
-            };
-            if threat
-                .clearance(&leg)
-                .is_none_or(|clearance| clearance >= 0.0)
-            {
-                continue;
+        let above = threat
+            .top
+            .filter(|top| *top <= highest)
+            .map(|z| Self { z, is_above: true });
+        let below = threat.base.filter(|base| *base > lowest).map(|base| Self {
+            z: base - TOUCH,
+            is_above: false,
+        });
+        let away = |level: &Self| (level.z - z).abs();
+        [above, below]
+            .into_iter()
+            .flatten()
+            .min_by(|one, other| away(one).total_cmp(&away(other)))
+    }
+
+    /// `z` if it is past the threat, else the level.
+    fn beyond(&self, z: f64) -> f64 {
+        if self.is_above {
+            z.max(self.z)
+        } else {
+            z.min(self.z)
+        }
+    }
+
+    /// The waypoints that may be added to `leg`, of which the part `span` is within the threat: one at each end of that
+    /// part, or only one, in the middle and so far past the level that both legs keep it.
+    fn ways(&self, leg: &Segment, (from, to): (f64, f64)) -> [Vec<Point3>; 2] {
+        let at = |share: f64, z: f64| {
+            let at = leg.at(share);
+            Point3::new(at.x, at.y, z)
+        };
+        let is_inner = |share: &f64| (0.0..1.0).contains(share) && *share > 0.0;
+        let ends = [from, to].into_iter().filter(is_inner);
+        let both = ends.map(|share| at(share, self.z)).collect();
+        let middle = 0.5 * (from + to);
+        // A leg from `side` at height z, a whole `way` from the middle, must be at the level where the part begins or
+        // ends: (1 - share) peak + share z = level, with the share of the way on which it is within.
+        let peak = |side: f64, way: f64| {
+            let share = 0.5 * (to - from) / way;
+            (self.z - share * side) / (1.0 - share)
+        };
+        let peaks = [peak(leg.a.z, middle), peak(leg.b.z, 1.0 - middle)];
+        let peak = peaks.into_iter().fold(self.z, |peak, z| {
+            if self.is_above {
+                peak.max(z)
+            } else {
+                peak.min(z)
             }
-            let z = match (threat.top, threat.base) {
-                (Some(top), _) if top <= highest => top,
-                (_, Some(base)) if base > lowest => base - 1e-3,
-                _ => continue,
+        });
+        let one = if peak.is_finite() {
+            vec![at(middle, peak)]
+        } else {
+            Vec::new()
+        };
+        [one, both]
+    }
+
+    /// Move the free waypoints of `route` before `first` and after `last` up, or down, until the vehicle can climb from
+    /// one to the next.
+    fn reach(&self, scenario: &Scenario, route: &mut [Point3], first: usize, last: usize) {
+        let free = 1..route.len() - 1;
+        let mut bring = |idx: usize, from: usize| {
+            let climb = (route[idx].xy() - route[from].xy()).norm() * steepest(scenario);
+            let z = if self.is_above {
+                route[idx].z.max(route[from].z - climb)
+            } else {
+                route[idx].z.min(route[from].z + climb)
             };
-            for idx in [leg_idx, leg_idx + 1] {
-                if idx > 0 && idx < last {
-                    route[idx].z = z;
-                }
+            route[idx].z = z;
+        };
+        let (start, end) = (free.start, free.end);
+        (start..=first).rev().for_each(|idx| bring(idx, idx + 1));
+        (last..end).for_each(|idx| bring(idx, idx - 1));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::tests::{disc, scenario, soft_wall, wall};
+    use crate::planner::{Nobody, plan};
+    use crate::scenario::Seeding;
+
+    /// Start and target at 80 m on level ground, the band up to 150 m, and a threat between them that ends at 120 m.
+    fn with_a_low(mut threat: Threat) -> Scenario {
+        let mut scenario = scenario();
+        let ends = [100.0, 900.0].map(|x| Point3::new(x, 500.0, 80.0));
+        [scenario.start, scenario.target] = ends;
+        (scenario.altitude.min, scenario.altitude.max) = (30.0, 150.0);
+        threat.top = Some(120.0);
+        scenario.threats = vec![threat];
+        scenario
+    }
+
+    fn straight_over(scenario: &Scenario) -> Vec<Point3> {
+        lifted_over(&Model::new(scenario), vec![scenario.start, scenario.target])
+    }
+
+    fn keeps_limits(scenario: &Scenario, route: &[Point3]) -> bool {
+        price(&Model::new(scenario), route).is_feasible()
+    }
+
+    #[test]
+    fn one_waypoint_leads_over_a_thin_wall() {
+        let scenario = with_a_low(wall([498.0, 502.0], [-40.0, 1040.0]));
+        let route = straight_over(&scenario);
+        assert!(keeps_limits(&scenario, &route), "{route:?}");
+        assert_eq!(route.len(), 3);
+        assert!((120.0..121.0).contains(&route[1].z), "{}", route[1].z);
+    }
+
+    #[test]
+    fn two_waypoints_lead_over_a_wide_threat() {
+        for threat in [
+            disc([500.0, 500.0, 200.0, 230.0]),
+            wall([300.0, 700.0], [300.0, 700.0]),
+        ] {
+            let scenario = with_a_low(threat);
+            let route = straight_over(&scenario);
+            assert!(keeps_limits(&scenario, &route), "{route:?}");
+            assert_eq!(route.len(), 4);
+            for (at, x) in route[1..3].iter().zip([300.0, 700.0]) {
+                assert!((at - Point3::new(x, 500.0, 120.0)).norm() < 1e-6, "{at}");
             }
         }
+    }
+
+    #[test]
+    fn a_wall_that_begins_above_the_ground_is_passed_below() {
+        let mut scenario = with_a_low(wall([498.0, 502.0], [-40.0, 1040.0]));
+        (scenario.threats[0].base, scenario.threats[0].top) = (Some(60.0), None);
+        let route = straight_over(&scenario);
+        assert!(keeps_limits(&scenario, &route), "{route:?}");
+        assert!(route.len() == 3 && route[1].z < 60.0, "{route:?}");
+    }
+
+    /// A waypoint above a low threat, and its neighbours, which the vehicle must be able to climb to.
+    #[test]
+    fn waypoints_within_a_threat_are_raised_and_their_neighbours_follow() {
+        let mut scenario = with_a_low(disc([500.0, 500.0, 60.0, 60.0]));
+        scenario.vehicle.max_climb_deg = 20.0;
+        let at = |x: f64| Point3::new(x, 500.0, 80.0);
+        let route = [100.0, 420.0, 500.0, 580.0, 900.0].map(at).to_vec();
+        let route = lifted_over(&Model::new(&scenario), route);
+        assert!(keeps_limits(&scenario, &route), "{route:?}");
+        let high = |x: f64| route.iter().find(|at| at.x >= x).expect("on the way").z;
+        assert!((high(500.0) - 120.0).abs() < 1e-9);
+        assert!(high(420.0) > 105.0 && high(580.0) > 105.0);
+    }
+
+    #[test]
+    fn threats_that_no_leg_meets_and_that_close_the_band_change_nothing() {
+        let mut scenario = with_a_low(disc([500.0, 900.0, 60.0, 60.0]));
+        let straight = [scenario.start, scenario.target];
+        assert_eq!(straight_over(&scenario), straight);
+        let mut closed = disc([500.0, 500.0, 60.0, 60.0]);
+        closed.top = Some(151.0);
+        scenario.threats = vec![closed];
+        assert_eq!(straight_over(&scenario), straight);
+    }
+
+    /// The best way leads over the first wall, which is long, and round the end of the second, which is soft.
+    #[test]
+    fn one_wall_is_flown_over_and_the_next_one_rounded() {
+        let mut scenario = with_a_low(wall([200.0, 203.0], [-40.0, 1000.0]));
+        scenario
+            .threats
+            .push(soft_wall([600.0, 606.0], [-40.0, 700.0], 20.0));
+        scenario.vehicle.max_turn_deg = 30.0;
+        scenario.planner.waypoints = 8;
+        scenario.planner.seeding = Seeding::Tangent;
+        scenario.planner.polish = true;
+        (scenario.planner.population, scenario.planner.iterations) = (30, 30);
+        let outcome = plan(&scenario, &mut Nobody, &Nobody);
+        let bound = outcome.bound;
+        assert!(outcome.feasible);
+        assert!(bound.gap.expect("a bound") < 0.02, "{bound:?}");
     }
 }

@@ -191,6 +191,7 @@ pub(super) fn along_strings(
         .iter()
         .any(|threat| over::passable(scenario, threat))
     {
+        follow(&Obstacles::soft(scenario, in_the_way), STRINGS);
         follow(&Obstacles::hard(scenario, in_the_way), STRINGS);
     }
     let steep = steep_ground(scenario);
@@ -310,6 +311,5 @@ fn along(model: &Model, string: &TautString) -> Vec<Point3> {
     let mut route = vec![scenario.start];
     route.extend(corners.iter().map(|&corner| lifted(scenario, corner, 0.5)));
     route.push(scenario.target);
-    over::lift(model, &mut route);
-    route
+    over::lifted_over(model, route)
 }

@@ -5,7 +5,7 @@ use super::departure::early;
 use super::prices::Prices;
 use super::wall::Wall;
 use crate::geometry::{Point2, ring};
-use crate::seeding::arc::{crossing, nearest_points, point_segment};
+use crate::seeding::arc::{nearest_points, point_segment};
 use crate::seeding::outline::OutlineShape;
 
 /// Pairs of cores looked at before the search for gaps gives up.
@@ -269,5 +269,5 @@ fn is_closed(wall: &Wall, one: &Core, other: &Core, p: Point2, q: Point2) -> boo
         return true;
     }
     let middle = p + (q - p) * 0.5;
-    edges().all(|edge| crossing(edge, (p, q)).is_none()) && ring::contains(ring, middle)
+    edges().all(|edge| ring::crossing(edge, (p, q)).is_none()) && ring::contains(ring, middle)
 }

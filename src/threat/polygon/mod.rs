@@ -107,6 +107,19 @@ impl Polygon {
         intensity(self.margin, distance)
     }
 
+    /// The shares of `leg` between which lies all of it that is within the ring; `None` if it stays outside.
+    pub(super) fn span(&self, leg: &Segment) -> Option<(f64, f64)> {
+        let [a, b] = [leg.a.xy(), leg.b.xy()];
+        let ends = [(a, 0.0), (b, 1.0)];
+        let inside = ends.into_iter().filter(|(end, _)| self.contains(*end));
+        let crossed = ring::edges(&self.vertices).filter_map(|edge| ring::crossing((a, b), edge));
+        let shares = inside.map(|(_, share)| share).chain(crossed);
+        shares.fold(None, |span, share| {
+            let (from, to) = span.unwrap_or((share, share));
+            Some((from.min(share), to.max(share)))
+        })
+    }
+
     /// Whether the box around `leg` intersects the box around the soft zone.
     pub(super) fn may_reach(&self, leg: &Segment) -> bool {
         leg.bounds().meets(&self.extent)

@@ -104,6 +104,30 @@ fn clearance_is_exact_and_signed() {
 
 /// A leg that rises just to the base of a threat still enters it.
 #[test]
+fn the_span_of_a_leg_covers_all_of_it_that_is_inside() {
+    let check = |ring: &Polygon, [from_x, to_x]: [f64; 2], y: f64, expected: Option<[f64; 2]>| {
+        let span = ring.span(&leg([from_x, y, 50.0], [to_x, y, 80.0]));
+        let places =
+            span.map(|(from, to)| [from, to].map(|share| from_x + share * (to_x - from_x)));
+        match (places, expected) {
+            (Some(found), Some(expected)) => {
+                let off = [found[0] - expected[0], found[1] - expected[1]];
+                assert!(off.iter().all(|off| off.abs() < 1e-9), "{found:?}");
+            }
+            (found, expected) => assert_eq!(found, expected),
+        }
+    };
+    let square = square(10.0);
+    check(&square, [-10.0, 20.0], 5.0, Some([0.0, 10.0]));
+    check(&square, [5.0, 25.0], 5.0, Some([5.0, 10.0]));
+    check(&square, [-10.0, 5.0], 5.0, Some([0.0, 5.0]));
+    check(&square, [2.0, 8.0], 5.0, Some([2.0, 8.0]));
+    check(&square, [-10.0, 20.0], 11.0, None);
+    // What lies between the arms of a bay is covered too.
+    check(&bay(0.0), [-20.0, 20.0], 10.0, Some([-10.0, 10.0]));
+}
+
+#[test]
 fn a_single_point_may_lie_inside() {
     let check = |at: f64, expected: f64| {
         let clearance = square(0.0).clearance(&leg([-5.0, 7.0, 0.0], [5.0, 7.0, 9.0]), (at, at));

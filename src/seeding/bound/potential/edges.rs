@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 use super::super::wall::Wall;
 use super::zones::Zones;
 use crate::geometry::{Point2, Rect, Vector2, ring};
-use crate::seeding::arc::crossing;
 use crate::seeding::outline::OutlineShape;
 
 /// Maximum number of corners of a ring whose edges are listed.
@@ -194,7 +193,7 @@ fn crossings(one: &Line, other: &Line) -> [Option<Point2>; 2] {
             })
         }
         (Line::Straight(a, b), Line::Straight(c, d)) => {
-            let share = crossing((*a, *b), (*c, *d));
+            let share = ring::crossing((*a, *b), (*c, *d));
             [share.map(|share| a + (b - a) * share), None]
         }
     }

@@ -3,7 +3,8 @@
 use super::Search;
 use super::place::Place;
 use super::way::{Step, Way};
-use crate::seeding::arc::{Arc, Rounding, Sense, Tangent, crossing, tangent};
+use crate::geometry::ring;
+use crate::seeding::arc::{Arc, Rounding, Sense, Tangent, tangent};
 use crate::seeding::obstacles::Corner;
 
 impl Search<'_> {
@@ -105,7 +106,7 @@ impl Search<'_> {
             let Some((before, arc, earlier)) = &self.steps[step].before else {
                 return false;
             };
-            if crossing((earlier.from, earlier.to), (straight.from, straight.to)).is_some() {
+            if ring::crossing((earlier.from, earlier.to), (straight.from, straight.to)).is_some() {
                 return true;
             }
             own = signed(arc);

@@ -12,6 +12,14 @@ pub(super) fn of_environment(flags: &Flags) -> anyhow::Result<Loaded> {
         .map_err(|faults| anyhow!("wrong configuration\n  {}", faults.join("\n  ")))
 }
 
+/// Say which variables have no effect because of their spelling.
+pub(super) fn tell_misspelt() {
+    let names = std::env::vars_os().filter_map(|(name, _)| name.into_string().ok());
+    for line in config::misspelt(names) {
+        tracing::warn!("{line}");
+    }
+}
+
 /// The directory of the plans.
 pub(super) fn data_dir(config: &Config) -> anyhow::Result<PathBuf> {
     let data_dir = config.data_dir.clone();

@@ -52,6 +52,7 @@ pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
 pub(super) fn start(config: &Config) -> anyhow::Result<()> {
     let instruments = Arc::new(Instruments::default());
     let log = telemetry::log::init(config, &instruments.metrics)?;
+    config::tell_misspelt();
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .build()?;

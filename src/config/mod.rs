@@ -11,6 +11,7 @@ mod file;
 mod filter;
 mod flags;
 mod layers;
+mod misspelt;
 mod origin;
 mod print;
 mod setting;
@@ -27,6 +28,7 @@ pub use collector::{Endpoint, Headers};
 pub use filter::Filter;
 pub use flags::Flags;
 pub use layers::{Loaded, load};
+pub use misspelt::misspelt;
 pub use origin::Origin;
 pub use value::LogFormat;
 

@@ -3,7 +3,6 @@
 use super::steepest;
 use crate::cost::Model;
 use crate::geometry::{Point2, Point3, Segment};
-use crate::optimizer::Fitness;
 use crate::planner::price::price;
 use crate::scenario::Scenario;
 use crate::threat::Threat;
@@ -52,6 +51,16 @@ pub(super) fn lifted_over(model: &Model, mut route: Vec<Point3>) -> Vec<Point3> 
     route
 }
 
+/// The part of `leg` within `threat`, all of it up to an end that is as good as within.
+fn span(threat: &Threat, leg: &Segment) -> Option<(f64, f64)> {
+    let hair = TOUCH / leg.horizontal_length().max(TOUCH);
+    let (from, to) = threat.span(leg)?;
+    Some((
+        if from < hair { 0.0 } else { from },
+        if to > 1.0 - hair { 1.0 } else { to },
+    ))
+}
+
 /// Lead the leg of `route` that begins with waypoint `first` past `threat`; returns how many waypoints are added to it.
 fn pass(model: &Model, threat: &Threat, route: &mut Vec<Point3>, first: usize) -> usize {
     let leg = Segment {
@@ -59,33 +68,34 @@ fn pass(model: &Model, threat: &Threat, route: &mut Vec<Point3>, first: usize) -
         b: route[first + 1],
     };
     let is_through = threat.clearance(&leg).is_some_and(|clear| clear < 0.0);
-    let Some((from, to)) = is_through.then(|| threat.span(&leg)).flatten() else {
+    let Some((from, to)) = is_through.then(|| span(threat, &leg)).flatten() else {
         return 0;
     };
     let Some(level) = Level::past(model.scenario, threat, leg.at(0.5 * (from + to)).z) else {
         return 0;
     };
     // Where a waypoint lies within the threat, it is moved itself.
-    for (idx, is_within) in [(first, from <= 0.0), (first + 1, to >= 1.0)] {
-        if is_within && idx > 0 && idx + 1 < route.len() {
-            route[idx].z = level.beyond(route[idx].z);
+    let moved = [from <= 0.0, to >= 1.0];
+    let [one, both] = level.ways(&leg, (from, to));
+    let ways = [(moved, one), (moved, both), ([true; 2], Vec::new())];
+    let before = route.len();
+    let past = ways.map(|(moved, way)| {
+        let mut past = route.clone();
+        let ends = [first, first + 1].into_iter().zip(moved);
+        for (idx, _) in ends.filter(|(idx, moved)| *moved && *idx > 0 && idx + 1 < before) {
+            past[idx].z = level.beyond(past[idx].z);
         }
-    }
-    let [a, b] = [route[first], route[first + 1]];
-    let ways = level.ways(&Segment { a, b }, (from, to));
-    let priced = ways.into_iter().map(|way| {
-        let mut whole = vec![a];
-        whole.extend(&way);
-        whole.push(b);
-        (price(model, &whole), way)
+        let onward = past.split_off(first + 1);
+        past.extend(way.into_iter().chain(onward));
+        let next = first + 1 + past.len() - before;
+        level.reach(model.scenario, &mut past, first, next);
+        (price(model, &past), past)
     });
-    let best = priced.min_by(|(one, _), (other, _): &(Fitness, _)| one.rank(other));
-    let way = best.map(|(_, way)| way).unwrap_or_default();
-    let added = way.len();
-    let onward = route.split_off(first + 1);
-    route.extend(way.into_iter().chain(onward));
-    level.reach(model.scenario, route, first, first + 1 + added);
-    added
+    let best = past
+        .into_iter()
+        .min_by(|(one, _), (other, _)| one.rank(other));
+    *route = best.expect("there are three ways").1;
+    route.len() - before
 }
 
 /// The height at which a threat is passed.
@@ -123,8 +133,8 @@ impl Level {
         }
     }
 
-    /// The waypoints that may be added to `leg`, of which the part `span` is within the threat: one at each end of that
-    /// part, or only one, in the middle and so far past the level that both legs keep it.
+    /// The waypoints that may be added to `leg`, of which the part `span` is within the threat: only one, in the middle and
+    /// so far past the level that both legs keep it, or one at each end of that part.
     fn ways(&self, leg: &Segment, (from, to): (f64, f64)) -> [Vec<Point3>; 2] {
         let at = |share: f64, z: f64| {
             let at = leg.at(share);

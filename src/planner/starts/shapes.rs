@@ -46,6 +46,10 @@ const COARSE_OVER_HILLS: usize = 7;
 /// Maximum number of free waypoints of a coarse route, unless no route with so few is good enough.
 pub(super) const MOST_COARSE: usize = 20;
 
+/// Where no shape keeps all limits, as where the ends are outside the band, one that breaks them by up to this many times
+/// as much as the best may win as well.
+const ALIKE: f64 = 1.5;
+
 /// Shapes of routes, and what finding them has told about the ground.
 #[derive(Default)]
 pub(super) struct Shapes {
@@ -157,7 +161,7 @@ pub(super) fn bends(model: &Model, shapes: &[Vec<Point3>], hopeless: f64) -> usi
         COARSE_OVER_HILLS
     };
     let may_win = priced.iter().filter(|(fitness, _)| {
-        fitness.violation <= best.violation && fitness.cost <= best.cost * (1.0 + hopeless)
+        fitness.violation <= ALIKE * best.violation && fitness.cost <= best.cost * (1.0 + hopeless)
     });
     let bends = may_win.map(|(_, bends)| *bends);
     let fewest = bends.clone().min().unwrap_or(0);

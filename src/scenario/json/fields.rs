@@ -183,7 +183,7 @@ pub(super) fn given_twice(path: &Path<'_>, key: &str, faults: &mut Faults) {
 }
 
 /// The end of a message about a name that is not allowed: the one that it probably stands for.
-pub(super) fn hint(key: &str, allowed: &[&str]) -> String {
+pub(crate) fn hint(key: &str, allowed: &[&str]) -> String {
     nearest(key, allowed)
         .map(|name| format!(", did you mean {name}?"))
         .unwrap_or_default()

@@ -29,6 +29,7 @@ mod vehicle;
 mod writer;
 
 pub use fault::{CODES, Fault, MAX_LISTED, MORE_FAULTS, Refusal};
+pub(crate) use fields::hint;
 pub use parameters::{COMMON, CommonParameter, Takes};
 pub use ranges::MOST_M;
 pub use unread::Unread;

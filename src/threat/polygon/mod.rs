@@ -19,6 +19,9 @@ use cells::Cells;
 use index::Index;
 use nearest::{Edge, Feature, Kind, Piece, cut};
 
+/// A point nearer to a ring than this lies on it, metres.
+const ON_THE_RING: f64 = 1e-6;
+
 /// A simple ring that must not be entered, and a soft zone outside it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polygon {
@@ -107,11 +110,14 @@ impl Polygon {
         intensity(self.margin, distance)
     }
 
-    /// The shares of `leg` between which lies all of it that is within the ring; `None` if it stays outside.
+    /// The shares of `leg` between which lies all of it that is within the ring; `None` if it stays outside. An end on the
+    /// ring counts as within.
     pub(super) fn span(&self, leg: &Segment) -> Option<(f64, f64)> {
         let [a, b] = [leg.a.xy(), leg.b.xy()];
         let ends = [(a, 0.0), (b, 1.0)];
-        let inside = ends.into_iter().filter(|(end, _)| self.contains(*end));
+        let inside = ends
+            .into_iter()
+            .filter(|(end, _)| self.distance(*end) <= ON_THE_RING);
         let crossed = ring::edges(&self.vertices).filter_map(|edge| ring::crossing((a, b), edge));
         let shares = inside.map(|(_, share)| share).chain(crossed);
         shares.fold(None, |span, share| {

@@ -122,6 +122,8 @@ fn the_span_of_a_leg_covers_all_of_it_that_is_inside() {
     check(&square, [5.0, 25.0], 5.0, Some([5.0, 10.0]));
     check(&square, [-10.0, 5.0], 5.0, Some([0.0, 5.0]));
     check(&square, [2.0, 8.0], 5.0, Some([2.0, 8.0]));
+    check(&square, [10.0, 20.0], 5.0, Some([10.0, 10.0]));
+    check(&square, [0.0, 5.0], 5.0, Some([0.0, 5.0]));
     check(&square, [-10.0, 20.0], 11.0, None);
     // What lies between the arms of a bay is covered too.
     check(&bay(0.0), [-20.0, 20.0], 10.0, Some([-10.0, 10.0]));

@@ -140,7 +140,7 @@ impl Level {
             let at = leg.at(share);
             Point3::new(at.x, at.y, z)
         };
-        let is_inner = |share: &f64| (0.0..1.0).contains(share) && *share > 0.0;
+        let is_inner = |share: &f64| *share > 0.0 && *share < 1.0;
         let ends = [from, to].into_iter().filter(is_inner);
         let both = ends.map(|share| at(share, self.z)).collect();
         let middle = 0.5 * (from + to);
@@ -243,6 +243,24 @@ mod tests {
         let route = straight_over(&scenario);
         assert!(keeps_limits(&scenario, &route), "{route:?}");
         assert!(route.len() == 3 && route[1].z < 60.0, "{route:?}");
+    }
+
+    /// Between two corners of a string that lie on the threats' edges, no waypoint is added.
+    #[test]
+    fn the_ends_of_a_leg_over_adjoining_threats_are_raised() {
+        let mut scenario = with_a_low(wall([300.0, 500.0], [300.0, 500.0]));
+        let mut next = wall([500.0, 700.0], [300.0, 500.0]);
+        next.top = Some(110.0);
+        scenario.threats.push(next);
+        let corners = [[300.0, 490.0], [700.0, 480.0]].map(|[x, y]| Point3::new(x, y, 80.0));
+        let route = [scenario.start, corners[0], corners[1], scenario.target].to_vec();
+        let route = lifted_over(&Model::new(&scenario), route);
+        assert!(keeps_limits(&scenario, &route), "{route:?}");
+        assert_eq!(route.len(), 4);
+        assert!(
+            route[1..3].iter().all(|at| (at.z - 120.0).abs() < 1e-9),
+            "{route:?}"
+        );
     }
 
     /// A waypoint above a low threat, and its neighbours, which the vehicle must be able to climb to.

@@ -317,3 +317,28 @@ fn along(model: &Model, string: &TautString) -> Vec<Point3> {
     route.push(scenario.target);
     over::lifted_over(model, route)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::tests::{disc, scenario};
+
+    #[test]
+    fn shapes_that_break_limits_about_as_much_as_the_best_keep_their_bends() {
+        let mut scenario = scenario();
+        scenario.threats = vec![disc([500.0, 500.0, 50.0, 50.0])];
+        let model = Model::new(&scenario);
+        // Straight through the disc, so many metres deep.
+        let through = |depth: f64, bends: u32| -> Vec<Point3> {
+            let legs = f64::from(bends + 1);
+            let at = |idx| Point3::new(100.0 + 800.0 * f64::from(idx) / legs, 450.0 + depth, 100.0);
+            (0..=bends + 1).map(at).collect()
+        };
+        for (depth, expected) in [(12.0, 12), (20.0, 6)] {
+            let shapes = [through(10.0, 6), through(depth, 12)];
+            assert_eq!(bends(&model, &shapes, HOPELESS), expected, "{depth}");
+        }
+        let round = through(-10.0, 6);
+        assert_eq!(bends(&model, &[round, through(1.0, 12)], HOPELESS), 6);
+    }
+}

@@ -45,7 +45,7 @@ mod tests {
     use super::*;
     use crate::geometry::Point3;
     use crate::planner::tests::{
-        disc, hilly_scenario, mountain, scenario as level_scenario, soft_wall, wall,
+        disc, hilly_scenario, mountain, scenario as level_scenario, search_briefly, soft_wall, wall,
     };
     use crate::planner::{self, Nobody, plan};
     use crate::scenario::{Scenario, Seeding, WarmStart};
@@ -126,9 +126,7 @@ mod tests {
         let ends = [60.0, 940.0].map(|x| Point3::new(x, 500.0, 100.0));
         [scenario.start, scenario.target] = ends;
         scenario.vehicle.min_leg = 8.0;
-        scenario.planner.seeding = Seeding::Tangent;
-        scenario.planner.polish = true;
-        (scenario.planner.population, scenario.planner.iterations) = (30, 30);
+        search_briefly(&mut scenario);
         scenario.planner.seed = 2;
         let model = Model::new(&scenario);
         let mut nobody = Nobody;

@@ -188,9 +188,8 @@ impl Level {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::planner::tests::{disc, scenario, soft_wall, wall};
+    use crate::planner::tests::{disc, scenario, search_briefly, soft_wall, wall};
     use crate::planner::{Nobody, plan};
-    use crate::scenario::Seeding;
 
     /// Start and target at 80 m on level ground, the band up to 150 m, and a threat between them that ends at 120 m.
     fn with_a_low(mut threat: Threat) -> Scenario {
@@ -297,9 +296,7 @@ mod tests {
             .push(soft_wall([600.0, 606.0], [-40.0, 700.0], 20.0));
         scenario.vehicle.max_turn_deg = 30.0;
         scenario.planner.waypoints = 8;
-        scenario.planner.seeding = Seeding::Tangent;
-        scenario.planner.polish = true;
-        (scenario.planner.population, scenario.planner.iterations) = (30, 30);
+        search_briefly(&mut scenario);
         let outcome = plan(&scenario, &mut Nobody, &Nobody);
         let bound = outcome.bound;
         assert!(outcome.feasible);

@@ -228,9 +228,8 @@ fn around(arc: &Arc, count: usize, min_leg: f64) -> impl Iterator<Item = Point2>
 mod tests {
     use super::*;
     use crate::geometry::Point3;
-    use crate::planner::tests::{scenario, wall};
+    use crate::planner::tests::{scenario, search_briefly, wall};
     use crate::planner::{Nobody, plan};
-    use crate::scenario::Seeding;
 
     const MIN_LEG: f64 = 27.0;
 
@@ -319,9 +318,7 @@ mod tests {
         ];
         scenario.vehicle.min_leg = 9.0;
         scenario.planner.waypoints = 10;
-        scenario.planner.seeding = Seeding::Tangent;
-        scenario.planner.polish = true;
-        (scenario.planner.population, scenario.planner.iterations) = (30, 30);
+        search_briefly(&mut scenario);
         let outcome = plan(&scenario, &mut Nobody, &Nobody);
         assert!(outcome.feasible);
         let gap = outcome.cost.total / outcome.bound.lower - 1.0;

@@ -131,13 +131,19 @@ pub(in crate::planner) fn lobed([x, y, radius]: [f64; 3], corners: usize) -> Thr
     }
 }
 
+/// Let `scenario` be planned with all that helps, and few bats.
+pub(in crate::planner) fn search_briefly(scenario: &mut Scenario) {
+    let settings = &mut scenario.planner;
+    settings.seeding = Seeding::Tangent;
+    settings.polish = true;
+    (settings.population, settings.iterations) = (30, 30);
+}
+
 /// Such a zone of two hundred corners between start and target, planned with few bats.
 pub(in crate::planner) fn airspace() -> Scenario {
     let mut scenario = scenario();
     scenario.threats = vec![lobed([480.0, 450.0, 150.0], 200)];
-    scenario.planner.seeding = Seeding::Tangent;
-    scenario.planner.polish = true;
-    (scenario.planner.population, scenario.planner.iterations) = (30, 30);
+    search_briefly(&mut scenario);
     scenario
 }
 

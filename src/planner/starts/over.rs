@@ -134,7 +134,8 @@ impl Level {
     }
 
     /// The waypoints that may be added to `leg`, of which the part `span` is within the threat: only one, in the middle and
-    /// so far past the level that both legs keep it, or one at each end of that part.
+    /// so far past the level that both legs keep it, which cannot be where the part begins or ends with the leg; or one at
+    /// each end of that part.
     fn ways(&self, leg: &Segment, (from, to): (f64, f64)) -> [Vec<Point3>; 2] {
         let at = |share: f64, z: f64| {
             let at = leg.at(share);
@@ -158,20 +159,16 @@ impl Level {
                 peak.min(z)
             }
         });
-        let one = if peak.is_finite() {
-            vec![at(middle, peak)]
-        } else {
-            Vec::new()
-        };
-        [one, both]
+        let one = (from > 0.0 && to < 1.0).then(|| at(middle, peak));
+        [one.into_iter().collect(), both]
     }
 
     /// Move the free waypoints of `route` before `first` and after `last` up, or down, until the vehicle can climb from
     /// one to the next.
     fn reach(&self, scenario: &Scenario, route: &mut [Point3], first: usize, last: usize) {
-        let free = 1..route.len() - 1;
+        let (target, steepest) = (route.len() - 1, steepest(scenario));
         let mut bring = |idx: usize, from: usize| {
-            let climb = (route[idx].xy() - route[from].xy()).norm() * steepest(scenario);
+            let climb = (route[idx].xy() - route[from].xy()).norm() * steepest;
             let z = if self.is_above {
                 route[idx].z.max(route[from].z - climb)
             } else {
@@ -179,9 +176,8 @@ impl Level {
             };
             route[idx].z = z;
         };
-        let (start, end) = (free.start, free.end);
-        (start..=first).rev().for_each(|idx| bring(idx, idx + 1));
-        (last..end).for_each(|idx| bring(idx, idx - 1));
+        (1..=first).rev().for_each(|idx| bring(idx, idx + 1));
+        (last..target).for_each(|idx| bring(idx, idx - 1));
     }
 }
 

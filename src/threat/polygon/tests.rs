@@ -102,7 +102,6 @@ fn clearance_is_exact_and_signed() {
     check([4.0, 4.0, 0.0], [4.0, 4.0, 9.0], -4.0);
 }
 
-/// A leg that rises just to the base of a threat still enters it.
 #[test]
 fn the_span_of_a_leg_covers_all_of_it_that_is_inside() {
     let check = |ring: &Polygon, [from_x, to_x]: [f64; 2], y: f64, expected: Option<[f64; 2]>| {
@@ -129,6 +128,7 @@ fn the_span_of_a_leg_covers_all_of_it_that_is_inside() {
     check(&bay(0.0), [-20.0, 20.0], 10.0, Some([-10.0, 10.0]));
 }
 
+/// A leg that rises just to the base of a threat still enters it.
 #[test]
 fn a_single_point_may_lie_inside() {
     let check = |at: f64, expected: f64| {

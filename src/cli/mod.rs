@@ -35,7 +35,7 @@ enum Command {
     Plan(plan::Arguments),
     /// Write a JSON result in another format
     Export(export::Arguments),
-    /// Convert a GeoJSON, a KML or a QGroundControl plan to a scenario
+    /// Convert a GeoJSON, a KML, a QGroundControl plan or a map of airspace to a scenario
     Convert(convert::Arguments),
     /// Measure the algorithms, the planner and the service
     #[command(subcommand)]

@@ -10,6 +10,7 @@ mod quadratic;
 mod rect;
 pub mod ring;
 mod segment;
+pub mod simple;
 mod simplify;
 
 pub use quadratic::Quadratic;

@@ -29,8 +29,8 @@ pub(super) async fn read_json(
     Announced::json(state, headers)?.read(caller, body).await
 }
 
-/// The whole body, and whether it is declared as JSON or XML.
-pub(super) async fn read_json_or_xml(
+/// The whole body, and the syntax that it is declared to have.
+pub(super) async fn read_a_map(
     state: &AppState,
     caller: &Caller,
     headers: &HeaderMap,
@@ -40,10 +40,10 @@ pub(super) async fn read_json_or_xml(
         Some("application/xml" | "text/xml" | "application/vnd.google-earth.kml+xml") => {
             Syntax::Xml
         }
+        Some("text/plain") => Syntax::Lines,
         _ if is_json(headers) => Syntax::Json,
         _ => {
-            let allowed =
-                "application/geo+json, application/vnd.google-earth.kml+xml or application/json";
+            let allowed = "application/geo+json, application/vnd.google-earth.kml+xml, text/plain or application/json";
             return Err(unsupported(headers, allowed));
         }
     };

@@ -3,29 +3,53 @@
 use axum::Json;
 use axum::body::Body;
 use axum::extract::State;
-use axum::http::HeaderMap;
+use axum::http::{HeaderMap, Uri};
 
 use super::caller::Caller;
-use super::params::NoParams;
+use super::params::{self, Params};
 use super::problem::Problem;
 use super::{AppState, body, off_thread};
-use crate::import::{self, Conversion, Most};
+use crate::import::{self, Conversion, End, Flight, Most, WITHIN_M};
 
 /// `POST /scenarios:convert`.
 pub(super) async fn convert(
     State(state): State<AppState>,
     caller: Caller,
-    _: NoParams,
+    uri: Uri,
     headers: HeaderMap,
     body: Body,
 ) -> Result<Json<Conversion>, Problem> {
-    let (text, syntax) = body::read_json_or_xml(&state, &caller, &headers, body).await?;
+    let flight = flight(&uri)?;
+    let (text, syntax) = body::read_a_map(&state, &caller, &headers, body).await?;
     let limits = state.rules.limits;
     let most = Most {
         threats: limits.threats,
         polygon_vertices: limits.polygon_vertices,
     };
-    let conversion =
-        off_thread::run(&caller, move || import::convert(&text, syntax, most)).await??;
+    let conversion = off_thread::run(&caller, move || {
+        import::convert(&text, syntax, most, &flight)
+    })
+    .await??;
     Ok(Json(conversion))
+}
+
+/// The flight that a map of zones is converted for, in the query.
+fn flight(uri: &Uri) -> Result<Flight, Problem> {
+    let params = Params::read(uri, &["start", "target", "within"])?;
+    let end = |name: &str| {
+        let read = |text: &str| {
+            let end = text.parse::<End>();
+            end.map_err(|reason| params::refused(name, text, &reason))
+        };
+        params.text(name).map(read).transpose()
+    };
+    let flight = Flight {
+        start: end("start")?,
+        target: end("target")?,
+        within_m: params.within("within", &WITHIN_M, "a number of metres")?,
+    };
+    if flight.within_m.is_some() && (flight.start.is_none() || flight.target.is_none()) {
+        return Err(params::missing("start", "given with target and within"));
+    }
+    Ok(flight)
 }

@@ -1,9 +1,13 @@
 //! A scenario document under construction.
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::facts::{Facts, OF_A_THREAT, begin};
+use super::flight::Flight;
+use super::near::Near;
+use super::place::Place;
 use super::threat::{Threat, Threats, circle, polygon};
+use super::zones::{Widened, Zone};
 use super::{Assumed, Conversion, ImportError, Most, Unused};
 
 /// Most entries in the list of unused parts; the last one counts the rest.
@@ -11,13 +15,6 @@ const MOST_UNUSED: usize = 1000;
 
 /// Usual altitude limit of unmanned aircraft, metres above ground.
 const CEILING_M: f64 = 120.0;
-
-/// A place on the earth.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Place {
-    pub(super) lat: f64,
-    pub(super) lon: f64,
-}
 
 /// What has been read from a file so far.
 #[derive(Debug)]
@@ -29,6 +26,11 @@ pub(super) struct Draft {
     start: Option<(Place, f64)>,
     target: Option<(Place, f64)>,
     threats: Threats,
+    /// Of the flight that the file is converted for, if its ends are known beforehand.
+    near: Option<Near>,
+    /// Threats that lie elsewhere.
+    n_elsewhere: usize,
+    widened: Widened,
     /// Metres per second.
     pub(super) cruise_speed: Option<f64>,
     /// Elevation of the ground, metres, if the file gives it.
@@ -38,37 +40,34 @@ pub(super) struct Draft {
     more_unused: usize,
 }
 
-impl Place {
-    /// From degrees east and north.
-    pub(super) fn new(lon: f64, lat: f64) -> Result<Self, String> {
-        if !(-180.0..=180.0).contains(&lon) {
-            return Err(format!("longitude is {lon}, must be from -180 to 180"));
-        }
-        if !(-90.0..=90.0).contains(&lat) {
-            return Err(format!("latitude is {lat}, must be from -90 to 90"));
-        }
-        Ok(Self { lat, lon })
-    }
-
-    pub(super) fn json(self) -> Value {
-        json!({"lat": self.lat, "lon": self.lon})
-    }
-}
-
 impl Draft {
-    pub(super) fn new(datum: &'static str, most: Most) -> Self {
-        Self {
+    /// For `flight`, whose ends count before those of the file.
+    pub(super) fn new(datum: &'static str, most: Most, flight: &Flight) -> Self {
+        let mut draft = Self {
             name: None,
             datum,
             start: None,
             target: None,
             threats: Threats::up_to(most),
+            near: None,
+            n_elsewhere: 0,
+            widened: Widened::default(),
             cruise_speed: None,
             elevation: None,
             assumed: Vec::new(),
             unused: Vec::new(),
             more_unused: 0,
+        };
+        for (name, end) in [("start", flight.start), ("target", flight.target)] {
+            if let Some(end) = end {
+                draft.end(name, "", end.place, end.alt);
+            }
         }
+        if let (Some(start), Some(target)) = (flight.start, flight.target) {
+            let ends = [start, target].map(|end| end.place);
+            draft.near = Some(Near::of(ends, flight.within_m));
+        }
+        draft
     }
 
     /// Name the scenario, if the file does.
@@ -96,17 +95,20 @@ impl Draft {
         });
     }
 
-    /// Set the start or the target; the first one found counts.
-    pub(super) fn end(&mut self, end: &str, at: &str, place: Place, alt: f64) {
+    /// Set the start or the target; the first one found counts. `alt` is `None` if it is not known.
+    pub(super) fn end(&mut self, end: &str, at: &str, place: Place, alt: Option<f64>) {
         let slot = if end == "start" {
             &mut self.start
         } else {
             &mut self.target
         };
         if slot.is_some() {
-            self.leave(at, format!("another point is the {end} already"));
-        } else {
-            *slot = Some((place, alt));
+            return self.leave(at, format!("another point is the {end} already"));
+        }
+        *slot = Some((place, alt.unwrap_or(0.0)));
+        if alt.is_none() {
+            let reason = format!("0: no altitude of the {end} is given");
+            self.assume(&format!("/{end}/alt"), reason);
         }
     }
 
@@ -115,14 +117,7 @@ impl Draft {
     pub(super) fn point(&mut self, at: &str, facts: &Facts, place: Place, alt: Option<f64>) {
         if let Some(end) = facts.end() {
             self.leave_beside(at, facts, &["name"]);
-            if alt.is_none() {
-                let pointer = format!("/{end}/alt");
-                self.assume(
-                    &pointer,
-                    format!("0: the {end} has no altitude in the file"),
-                );
-            }
-            return self.end(end, at, place, alt.unwrap_or(0.0));
+            return self.end(end, at, place, alt);
         }
         match facts.number("radius") {
             Ok(Some(_)) => self.circle(at, facts, place),
@@ -166,8 +161,32 @@ impl Draft {
     }
 
     fn threat(&mut self, at: &str, facts: &Facts, threat: Threat) {
-        self.leave_beside(at, facts, &OF_A_THREAT);
-        self.threats.add(threat);
+        if self.keep(threat) {
+            self.leave_beside(at, facts, &OF_A_THREAT);
+        }
+    }
+
+    /// A zone of airspace.
+    pub(super) fn zone(&mut self, at: &str, zone: Zone) {
+        match zone.threat() {
+            Ok((threat, widened)) => {
+                if self.keep(threat) {
+                    self.widened.join(&widened);
+                }
+            }
+            Err(reason) => self.leave(at, reason),
+        }
+    }
+
+    /// Keep a threat, unless it lies elsewhere.
+    fn keep(&mut self, threat: Threat) -> bool {
+        let is_near = self.near.as_ref().is_none_or(|near| near.meets(&threat));
+        if is_near {
+            self.threats.add(threat);
+        } else {
+            self.n_elsewhere += 1;
+        }
+        is_near
     }
 
     fn leave_beside(&mut self, at: &str, facts: &Facts, used: &[&str]) {
@@ -182,6 +201,19 @@ impl Draft {
         self.count_the_rest();
         let unused = self.unused;
         ImportError::NoScenario { detail, unused }
+    }
+
+    fn assume_of_zones(&mut self) {
+        if let Some(near) = &self.near {
+            let (beyond, elsewhere) = (near.beyond_m(), self.n_elsewhere);
+            let reason = format!(
+                "{beyond:.0} m beyond start and target on each side; threats of the file that lie outside and are left out: {elsewhere}"
+            );
+            self.assume("/area", reason);
+        }
+        for reason in std::mem::take(&mut self.widened).reasons() {
+            self.assume("/threats", reason);
+        }
     }
 
     fn count_the_rest(&mut self) {
@@ -202,7 +234,7 @@ impl Draft {
                 .map(|(name, _)| format!("no {name}"))
                 .collect();
             let detail = format!(
-                "{} in the file: a point of that name makes one",
+                "{} in the file: a point of that name makes one, or the options start and target say where they are",
                 missing.join(" and ")
             );
             return Err(self.refused(detail));
@@ -221,6 +253,7 @@ impl Draft {
             "/terrain",
             format!("flat ground at {elevation} m: the file has none"),
         );
+        self.assume_of_zones();
         let end =
             |(place, alt): (Place, f64)| json!({"lat": place.lat, "lon": place.lon, "alt": alt});
         let mut scenario = json!({
@@ -233,6 +266,9 @@ impl Draft {
             "terrain": {"kind": "flat", "elevation": elevation},
             "altitude": {"min": 0.0, "max": CEILING_M},
         });
+        if let Some(near) = &self.near {
+            scenario["area"] = near.json();
+        }
         if let Some(speed) = self.cruise_speed {
             scenario["vehicle"] = json!({"cruise_speed": speed});
         }

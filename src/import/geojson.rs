@@ -5,8 +5,11 @@ use geojson::{Feature, GeometryValue, JsonValue, Position};
 use serde_json::Value;
 
 use super::antimeridian;
-use super::draft::{Draft, Place};
+use super::draft::Draft;
 use super::facts::Facts;
+use super::flight::Flight;
+use super::place::Place;
+use super::zones::ed318;
 use super::{Conversion, ImportError, Most};
 
 /// Names that older GeoJSON uses for the only reference system of RFC 7946. The last ones mean the latitude first, but
@@ -19,9 +22,18 @@ const WGS84: [&str; 4] = [
 ];
 
 /// Convert a feature collection, or a feature, to a scenario.
-pub(super) fn convert(mut document: Value, most: Most) -> Result<Conversion, ImportError> {
+pub(super) fn convert(
+    mut document: Value,
+    most: Most,
+    flight: &Flight,
+) -> Result<Conversion, ImportError> {
     refuse_other_systems(&document)?;
-    let mut draft = Draft::new("ellipsoid", most);
+    let datum = if has_zones(&document) {
+        "msl"
+    } else {
+        "ellipsoid"
+    };
+    let mut draft = Draft::new(datum, most, flight);
     draft.call(document["name"].as_str());
     match document["type"].as_str() {
         Some("FeatureCollection") => {
@@ -61,12 +73,24 @@ fn refuse_other_systems(document: &Value) -> Result<(), ImportError> {
     }
 }
 
+/// Whether any feature is a zone of ED-318, whose heights are above mean sea level.
+fn has_zones(document: &Value) -> bool {
+    let features = document["features"].as_array();
+    features.map_or_else(
+        || ed318::is_one(document),
+        |features| features.iter().any(ed318::is_one),
+    )
+}
+
 fn feature(draft: &mut Draft, at: &str, value: JsonValue) {
     if !value.is_object() {
         return draft.leave(at, "no feature: a feature is an object");
     }
     if !matches!(value["geometry"], JsonValue::Null | JsonValue::Object(_)) {
         return draft.leave(at, "a feature whose geometry is neither an object nor null");
+    }
+    if ed318::is_one(&value) {
+        return ed318::zone(draft, at, &value);
     }
     let feature = match serde_json::from_value::<Feature>(value) {
         Ok(feature) => feature,

@@ -7,8 +7,10 @@
 use roxmltree::{Document, Node, ParsingOptions};
 use serde_json::{Map, Value};
 
-use super::draft::{Draft, Place};
+use super::draft::Draft;
 use super::facts::Facts;
+use super::flight::Flight;
+use super::place::Place;
 use super::{Conversion, ImportError, Most, antimeridian, xml};
 
 /// Most XML nodes: elements, texts and comments. The limit on the file's size bounds them too.
@@ -28,7 +30,7 @@ const NOT_READ: [&str; 6] = [
 ];
 
 /// Convert a KML document to a scenario.
-pub(super) fn convert(text: &[u8], most: Most) -> Result<Conversion, ImportError> {
+pub(super) fn convert(text: &[u8], most: Most, flight: &Flight) -> Result<Conversion, ImportError> {
     let text = std::str::from_utf8(text)
         .map_err(|error| ImportError::NotXml(format!("the file is not UTF-8: {error}")))?;
     xml::check(text).map_err(ImportError::NotXml)?;
@@ -46,7 +48,7 @@ pub(super) fn convert(text: &[u8], most: Most) -> Result<Conversion, ImportError
             "the root element is {found}, must be kml"
         )));
     }
-    let mut draft = Draft::new("msl", most);
+    let mut draft = Draft::new("msl", most, flight);
     let container = root.children().find(|node| is(node, "Document"));
     let name = container.and_then(|node| text_of(&node, "name"));
     draft.call(name.as_deref());

@@ -1,4 +1,4 @@
-//! Converts files of other programs to scenarios: GeoJSON, KML, QGroundControl plans.
+//! Converts files of other programs to scenarios: GeoJSON, KML, QGroundControl plans, and maps of airspace.
 //!
 //! Parts of a file that a scenario cannot represent are listed as unused; parts of a scenario that the file does not
 //! give are listed as assumed. Scenarios are not validated here; that happens when they are submitted. Deliberately
@@ -7,15 +7,24 @@
 mod antimeridian;
 mod draft;
 mod facts;
+mod flight;
 mod geojson;
 mod kml;
+mod near;
+mod place;
 mod plan;
+mod text;
 mod threat;
 mod xml;
+mod zones;
+
+pub use flight::{End, Flight, WITHIN_M};
 
 use serde::Serialize;
 use serde_json::Value;
 use thiserror::Error;
+
+use zones::{ed269, openair};
 
 /// The result of a conversion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -59,8 +68,10 @@ pub struct Most {
 /// Syntax of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Syntax {
-    /// GeoJSON, or a QGroundControl plan.
+    /// GeoJSON, ED-269, or a QGroundControl plan.
     Json,
+    /// Lines of text: OpenAir.
+    Lines,
     /// KML.
     Xml,
 }
@@ -104,35 +115,46 @@ impl Syntax {
     /// Detect the syntax from the beginning of a text.
     #[must_use]
     pub fn of(text: &[u8]) -> Self {
-        let begin = without_mark(text).trim_ascii_start();
-        if begin.starts_with(b"<") {
+        let text = text::decoded(text);
+        if text.trim_ascii_start().starts_with(b"<") {
             Self::Xml
+        } else if openair::is_one(&text) {
+            Self::Lines
         } else {
             Self::Json
         }
     }
 }
 
-/// Convert a file to a scenario document.
+/// Convert a file to a scenario document. The ends of `flight` count before those of the file; where both are given, the
+/// flight is kept within an area around them, and threats outside it are left out.
 ///
 /// # Errors
 /// [`ImportError::NotJson`] and [`ImportError::NotXml`] when `text` does not have that syntax,
 /// [`ImportError::NoScenario`] when it does but has no start or no target, or one whose altitude is not known, or has
 /// more than `most`.
-pub fn convert(text: &[u8], syntax: Syntax, most: Most) -> Result<Conversion, ImportError> {
-    let text = without_mark(text);
+pub fn convert(
+    text: &[u8],
+    syntax: Syntax,
+    most: Most,
+    flight: &Flight,
+) -> Result<Conversion, ImportError> {
+    let text = &*text::decoded(text);
     if text.starts_with(b"PK\x03\x04") {
         let found = "a zip archive, as KMZ is: unpack it and take the doc.kml in it";
         return Err(ImportError::NotXml(found.to_owned()));
     }
     match syntax {
-        Syntax::Xml => kml::convert(text, most),
+        Syntax::Xml => kml::convert(text, most, flight),
+        Syntax::Lines => openair::convert(text, most, flight),
         Syntax::Json => {
             let document = json(text)?;
             if document["fileType"] == "Plan" {
-                plan::convert(&document, most)
+                plan::convert(&document, most, flight)
+            } else if ed269::is_one(&document) {
+                ed269::convert(&document, most, flight)
             } else {
-                geojson::convert(document, most)
+                geojson::convert(document, most, flight)
             }
         }
     }
@@ -181,11 +203,6 @@ fn detail(error: &serde_json::Error) -> String {
     let whole = error.to_string();
     let place = format!(" at line {} column {}", error.line(), error.column());
     whole.strip_suffix(&place).unwrap_or(&whole).to_owned()
-}
-
-/// `text` without a UTF-8 byte order mark.
-fn without_mark(text: &[u8]) -> &[u8] {
-    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
 }
 
 #[cfg(test)]

@@ -5,8 +5,10 @@ use std::ops::RangeInclusive;
 
 use serde_json::{Map, Value};
 
-use super::draft::{Draft, Place};
+use super::draft::Draft;
 use super::facts::{Facts, begin, shown};
+use super::flight::Flight;
+use super::place::Place;
 use super::{Conversion, ImportError, Most, antimeridian};
 
 /// MAVLink commands (`MAV_CMD`) that have a position: waypoints and similar, then take-offs and landings.
@@ -70,14 +72,18 @@ fn place_of_item(index: usize) -> String {
 }
 
 /// Convert a plan to a scenario.
-pub(super) fn convert(document: &Value, most: Most) -> Result<Conversion, ImportError> {
+pub(super) fn convert(
+    document: &Value,
+    most: Most,
+    flight: &Flight,
+) -> Result<Conversion, ImportError> {
     let mission = &document["mission"];
     let Some(items) = mission["items"].as_array() else {
         return Err(ImportError::no_scenario(
             "a plan has mission.items, a list; this one has none",
         ));
     };
-    let mut draft = Draft::new("msl", most);
+    let mut draft = Draft::new("msl", most, flight);
     let home = home(mission);
     draft.elevation = home.and_then(|home| home.alt.as_f64());
     draft.cruise_speed = speed(mission);
@@ -254,7 +260,7 @@ fn ends(draft: &mut Draft, home: Option<Home>, stops: &[Stop]) -> Result<(), Str
         } else if stop.on_ground {
             draft.assume(&pointer, format!("{alt}, on the ground as home is"));
         }
-        draft.end(end, &at, stop.place, alt);
+        draft.end(end, &at, stop.place, Some(alt));
         Ok(())
     };
     match (stops, home) {
@@ -265,7 +271,7 @@ fn ends(draft: &mut Draft, home: Option<Home>, stops: &[Stop]) -> Result<(), Str
                 let alt = shown(alt);
                 format!("the start, {at}, has the altitude {alt}, must be a number")
             })?;
-            draft.end("start", at, place, alt);
+            draft.end("start", at, place, Some(alt));
             set(draft, "target", only)?;
         }
         ([only], None) => set(draft, "target", only)?,

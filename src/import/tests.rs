@@ -3,6 +3,7 @@
 mod geojson;
 mod kml;
 mod plan;
+mod zones;
 
 use serde_json::json;
 
@@ -15,7 +16,7 @@ const MOST: Most = Most {
 
 /// Within the limits that a service has by default.
 fn convert(text: &[u8], syntax: Syntax) -> Result<Conversion, ImportError> {
-    super::convert(text, syntax, MOST)
+    super::convert(text, syntax, MOST, &Flight::default())
 }
 
 /// The reasons, each with its place.
@@ -147,8 +148,14 @@ fn files_of_too_many_threats_are_refused() {
         plan.to_string()
     };
     let check = |file: &dyn Fn(usize) -> String, most: Most, expected: &str| {
-        let converted =
-            |text: String| super::convert(text.as_bytes(), Syntax::of(text.as_bytes()), most);
+        let converted = |text: String| {
+            super::convert(
+                text.as_bytes(),
+                Syntax::of(text.as_bytes()),
+                most,
+                &Flight::default(),
+            )
+        };
         let read = converted(file(4)).expect("no more than may be");
         assert_eq!(read.scenario["threats"].as_array().map(Vec::len), Some(4));
         let refused = converted(file(5)).expect_err(expected);

@@ -3,14 +3,14 @@
 use serde_json::{Value, json};
 
 use super::Most;
-use super::draft::Place;
 use super::facts::Facts;
+use super::place::Place;
 
 /// A threat of the document.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Threat {
     name: Option<String>,
-    shape: Shape,
+    pub(super) shape: Shape,
     /// Metres in the document's datum, as is `top`.
     base: Option<f64>,
     top: Option<f64>,
@@ -18,7 +18,7 @@ pub(super) struct Threat {
 
 /// Lengths in metres.
 #[derive(Debug, Clone, PartialEq)]
-enum Shape {
+pub(super) enum Shape {
     Cylinder {
         center: Place,
         radius: f64,
@@ -84,7 +84,48 @@ impl Threats {
     }
 }
 
+impl Shape {
+    /// Without a soft zone.
+    pub(super) fn circle(center: Place, radius: f64) -> Result<Self, String> {
+        let allowed = radius.is_finite() && radius > 0.0;
+        let influence = radius;
+        allowed
+            .then_some(Self::Cylinder {
+                center,
+                radius,
+                influence,
+            })
+            .ok_or_else(|| format!("radius is {radius}, must be > 0"))
+    }
+
+    /// Without a soft zone.
+    pub(super) fn polygon(vertices: Vec<Place>) -> Self {
+        let margin = 0.0;
+        Self::Polygon { vertices, margin }
+    }
+}
+
 impl Threat {
+    /// Between two heights, or one, or none.
+    pub(super) fn new(
+        name: Option<String>,
+        shape: Shape,
+        base: Option<f64>,
+        top: Option<f64>,
+    ) -> Result<Self, String> {
+        if let (Some(base), Some(top)) = (base, top)
+            && base >= top
+        {
+            return Err(format!("base is {base}, must be < the top, {top}"));
+        }
+        Ok(Self {
+            name,
+            shape,
+            base,
+            top,
+        })
+    }
+
     fn json(self) -> Value {
         let Self {
             name, base, top, ..
@@ -118,20 +159,17 @@ impl Threat {
 /// A circle with the radius in its facts.
 pub(super) fn circle(facts: &Facts, center: Place) -> Result<Threat, String> {
     let radius = facts.number("radius")?.unwrap_or_default();
-    if radius <= 0.0 {
-        return Err(format!("radius is {radius}, must be > 0"));
+    let mut shape = Shape::circle(center, radius)?;
+    if let Some(given) = facts.number("influence")? {
+        if given < radius {
+            return Err(format!(
+                "influence is {given}, must be >= the radius, {radius}"
+            ));
+        }
+        if let Shape::Cylinder { influence, .. } = &mut shape {
+            *influence = given;
+        }
     }
-    let influence = facts.number("influence")?.unwrap_or(radius);
-    if influence < radius {
-        return Err(format!(
-            "influence is {influence}, must be >= the radius, {radius}"
-        ));
-    }
-    let shape = Shape::Cylinder {
-        center,
-        radius,
-        influence,
-    };
     between_heights(shape, facts)
 }
 
@@ -163,15 +201,5 @@ pub(super) fn polygon(facts: &Facts, ring: &[[f64; 2]]) -> Result<Threat, String
 
 fn between_heights(shape: Shape, facts: &Facts) -> Result<Threat, String> {
     let (base, top) = (facts.number("base")?, facts.number("top")?);
-    if let (Some(base), Some(top)) = (base, top)
-        && base >= top
-    {
-        return Err(format!("base is {base}, must be < the top, {top}"));
-    }
-    Ok(Threat {
-        name: facts.name().map(str::to_owned),
-        shape,
-        base,
-        top,
-    })
+    Threat::new(facts.name().map(str::to_owned), shape, base, top)
 }

@@ -6,14 +6,19 @@ import { threatName } from './words.js';
 /** So many places are named for a reason, and so many reasons given: the rest is counted. */
 const NAMED = 3;
 const REASONS = 5;
-const CAN_BE_OPENED = 'What can be opened: scenarios in JSON, GeoJSON, KML, and plans of QGroundControl.';
+const CAN_BE_OPENED = 'What can be opened: scenarios in JSON, GeoJSON, KML, plans of QGroundControl, and maps of airspace (OpenAir, ED-269, ED-318).';
 
-/** The document in a file, and what there is to say about it. */
-export async function readFile(file) {
+/**
+ * The document in a file, and what there is to say about it. A map without start and target is laid over `open`, the document that is
+ * shown.
+ */
+export async function readFile(file, open) {
   const text = await file.text();
   const kml = /\.kml$/i.test(file.name) || text.trimStart().startsWith('<');
+  // A comment or a record of OpenAir.
+  const lines = !kml && /^\s*(\*|[A-Z]{2}\s)/.test(text);
   if (text.startsWith('PK')) throw new Said(`${file.name} is a zip archive, as KMZ is: unpack it, and open the doc.kml in it.`);
-  if (!kml) {
+  if (!kml && !lines) {
     let document;
     try {
       document = JSON.parse(text);
@@ -27,17 +32,63 @@ export async function readFile(file) {
       return { document, note: null };
     }
   }
-  const type = kml ? 'application/vnd.google-earth.kml+xml' : 'application/json';
+  const type = kml ? 'application/vnd.google-earth.kml+xml' : lines ? 'text/plain' : 'application/json';
   // As it is: what its bytes mean is for the service to say.
-  const { scenario, assumed, unused } = await ask('/scenarios:convert', { method: 'POST', body: file, type }).catch((refusal) => {
-    throw [400, 422].includes(refusal.status) ? new Said(`${file.name} holds no scenario: ${refusal.message.replace(/\.$/, '')}. ${CAN_BE_OPENED}`) : refusal;
-  });
+  const converted = (query) => ask(`/scenarios:convert${query}`, { method: 'POST', body: file, type });
+  const ends = endsOf(open);
+  try {
+    return whole(await converted(''));
+  } catch (refusal) {
+    if (!ends || refusal.problem?.type !== '/problems/no-scenario') throw inWords(refusal, file, ends);
+  }
+  try {
+    return laidOver(open, await converted(`?${new URLSearchParams(ends)}`));
+  } catch (refusal) {
+    throw inWords(refusal, file, ends);
+  }
+}
+
+function inWords(refusal, file, ends) {
+  if (![400, 422].includes(refusal.status)) return refusal;
+  const why = refusal.message.replace(/\.$/, '');
+  const how = ends || !/^no (start|target)/.test(why) ? '' : ' A map of zones is laid over a scenario in degrees that has both: open or begin one first.';
+  return new Said(`${file.name} holds no scenario: ${why}.${how} ${CAN_BE_OPENED}`);
+}
+
+/** The start and the target of a document in degrees, as the service takes them; null where it has none. */
+function endsOf({ frame, start, target }) {
+  const places = [start, target].map((end) => [end?.lat, end?.lon, end?.alt ?? 0]);
+  if (frame !== 'wgs84' || !places.flat().every(Number.isFinite)) return null;
+  return { start: places[0].join(','), target: places[1].join(',') };
+}
+
+/** What was converted, as a document of its own. */
+function whole({ scenario, assumed, unused }) {
+  return { document: scenario, note: note(scenario, assumed, unused) };
+}
+
+/** The zones of a map as further threats of the document that is open. */
+function laidOver(open, { scenario, assumed, unused }) {
+  const datum = open.altitude_datum ?? 'msl';
+  const limited = scenario.threats.some(({ base, top }) => base !== null || top !== null);
+  if (limited && datum !== scenario.altitude_datum) {
+    throw new Said(`The heights in the file are above another datum (${scenario.altitude_datum}) than those of the scenario (${datum}).`);
+  }
+  const { threats } = scenario;
+  const document = { ...open, area: scenario.area, threats: [...(open.threats ?? []), ...threats] };
+  const added = threats.length === 1 ? 'One threat was added.' : `${threats.length} threats were added.`;
+  const ofZones = assumed.filter(({ pointer }) => /^\/(area|threats)/.test(pointer));
+  return { document, note: [added, note(scenario, ofZones, unused)].filter(Boolean).join(' ') };
+}
+
+/** What there is to say of a conversion; null where there is nothing. */
+function note(scenario, assumed, unused) {
   const notes = [
     ['Taken for granted', grouped(assumed.map(({ pointer, reason }) => [fieldName(pointer, scenario), reason]))],
     ['Not used', grouped(unused.map(({ where, reason }) => [where, reason]))],
   ];
   const said = notes.filter(([, list]) => list.length).map(([title, list]) => `${title}: ${list.join('; ')}.`);
-  return { document: scenario, note: said.join(' ') || null };
+  return said.join(' ') || null;
 }
 
 /** `[what, reason]` said once for each reason, with those that share it. */

@@ -116,7 +116,7 @@ function begin(document_, plan = null, kept = true) {
 async function openFile(file) {
   wishes += 1;
   const wish = wishes;
-  const { document: read, note } = await readFile(file);
+  const { document: read, note } = await readFile(file, draft.document ?? {});
   if (wish !== wishes) return;
   stepFrom(draft.document);
   begin(read);

@@ -407,7 +407,13 @@ async fn files_that_are_no_scenario_are_refused() {
             415,
             "unsupported-media-type",
         ),
-        ("text/plain", "QGC WPL 110", 415, "unsupported-media-type"),
+        ("text/plain", "QGC WPL 110", 422, "no-scenario"),
+        (
+            "text/plain; charset=utf-16",
+            "AC R",
+            415,
+            "unsupported-media-type",
+        ),
         (
             "application/xml; charset=latin1",
             "<kml/>",
@@ -427,8 +433,70 @@ async fn files_that_are_no_scenario_are_refused() {
         .send(Method::POST, "/scenarios:convert", &headers, long)
         .await;
     answer.expect_problem(413, "body-too-large");
-    let answer = api.post("/scenarios:convert?into=kml", &json!({})).await;
-    answer.expect_problem(400, "invalid-parameter");
+    for query in [
+        "into=kml",
+        "start=47.4",
+        "start=47.4,8.5&start=47.4,8.5",
+        "target=98,8.5",
+        "within=100",
+        "start=47.4,8.5&target=47.5,8.5&within=0",
+        "start=47.4,8.5&target=47.5,8.5&within=100001",
+    ] {
+        let path = format!("/scenarios:convert?{query}");
+        let answer = api.post(&path, &json!({})).await;
+        answer.expect_problem(400, "invalid-parameter");
+    }
+}
+
+/// Such a map says where not to fly: from where to where is in the request.
+#[tokio::test]
+async fn a_map_of_airspace_becomes_a_scenario_for_a_flight() {
+    let api = Api::new();
+    let zone = |name: &str, center: &str| {
+        format!("AC R\nAN {name}\nAL GND\nAH 3000ft MSL\nV X={center}\nDC 0.3\n")
+    };
+    let map = [
+        zone("range", "47:24:00 N 008:33:00 E"),
+        zone("abroad", "60:00:00 N 008:33:00 E"),
+    ]
+    .concat();
+    let headers = [("content-type", "text/plain; charset=utf-8")];
+    let path = "/scenarios:convert?start=47.4,8.53,500&target=47.4,8.57,500&within=3000";
+    let answer = api.send(Method::POST, path, &headers, map.clone()).await;
+    assert_eq!(answer.status, 200, "{answer:?}");
+    let scenario = &answer.json()["scenario"];
+    assert_eq!(scenario["threats"].as_array().map(Vec::len), Some(1));
+    let accepted = api.post("/plans?validate_only=true", scenario).await;
+    assert_eq!(accepted.status, 200, "{accepted:?}");
+
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let file = directory.path().join("zones.txt");
+    fs::write(&file, &map).expect("written");
+    let file = file.to_str().expect("UTF-8");
+    let ends = ["--start", "47.4,8.53,500", "--target", "47.4,8.57,500"];
+    let read = process::run(
+        &[&["convert", file, "--within", "3000"], &ends[..]].concat(),
+        "",
+    );
+    assert_eq!(read.status.code(), Some(0), "{read:?}");
+    let read: Value = serde_json::from_slice(&read.stdout).expect("a scenario");
+    assert_eq!(&read, scenario);
+    let refused = process::run(&["convert", file, "--within", "3000"], "");
+    assert_eq!(refused.status.code(), Some(1), "a wrong command line");
+}
+
+/// What is not used for the same reason is told together.
+#[test]
+fn the_command_line_groups_what_it_does_not_use() {
+    let line = json!({"type": "Feature", "properties": {},
+        "geometry": {"type": "LineString", "coordinates": [[8.5, 47.4], [8.6, 47.4]]}});
+    let map = json!({"type": "FeatureCollection", "features": vec![line; 5]});
+    let told = process::run(&["convert", "-"], &map.to_string());
+    assert_eq!(
+        String::from_utf8_lossy(&told.stderr),
+        "not used /features/0, /features/1, /features/2 and 2 more: a line: points and polygons make a scenario\n\
+         -: no start and no target in the file: a point of that name makes one, or the options start and target say where they are\n"
+    );
 }
 
 /// A file gets no further than the scenario that it would become: the service's own limits hold, and on the command

@@ -1,14 +1,19 @@
 //! Malformed files to convert: they are read or refused. What the readers make of valid files is tested beside
 //! them.
 
-use noctule::import::{self, Conversion, ImportError, Most, Syntax};
+use noctule::import::{self, Conversion, Flight, ImportError, Most, Syntax};
 use proptest::prelude::*;
 
 use crate::support::patience::at_little_cost;
 use crate::support::size::cases;
 
+const MOST: Most = Most {
+    threats: 10_000,
+    polygon_vertices: 20_000,
+};
+
 /// One file of each format, with everything that its reader handles.
-const FILES: [&str; 3] = [GEOJSON, KML, PLAN];
+const FILES: [&str; 6] = [GEOJSON, KML, PLAN, OPENAIR, ED_269, ED_318];
 
 const GEOJSON: &str = r#"{"type": "FeatureCollection", "name": "flight", "features": [
   {"type": "Feature", "properties": {"name": "Start"}, "geometry": {"type": "Point", "coordinates": [8.5, 47.3, 500]}},
@@ -43,13 +48,58 @@ const PLAN: &str = r#"{"fileType": "Plan", "version": 1, "groundStation": "QGrou
     "polygons": [{"inclusion": false, "polygon": [[47.31, 8.51], [47.31, 8.52], [47.32, 8.52]]}]},
   "rallyPoints": {"points": [[47.3, 8.5, 10]]}}"#;
 
+const OPENAIR: &str = "* Zones
+AC R
+AY TRA
+AN LS-R 1
+AL 500ft AGL
+AH FL 100
+V X=47:24:00 N 008:33:00 E
+DC 2.5
+AC D
+AN TMA
+AL 4500 ft MSL
+AH UNL
+V D=-
+V X=47:24:30 N 008:33:30 E
+DA 5,90,0
+DB 47:30:00 N 008:33:00 E,47:24:00 N 008:42:00 E
+DP 47:20:00 N 008:31:00 E
+AC E
+AN open
+AL GND
+AH FL100
+DP 47:20:00 N 008:31:00 E
+";
+
+const ED_269: &str = r#"{"title": "zones", "features": [
+  {"identifier": "A1", "name": "Airport", "restriction": "PROHIBITED", "geometry": [
+    {"uomDimensions": "M", "lowerLimit": 0, "lowerVerticalReference": "AGL", "upperLimit": 2000, "upperVerticalReference": "AMSL",
+     "horizontalProjection": {"type": "Circle", "center": [8.5, 47.4], "radius": 750}},
+    {"uomDimensions": "FT", "lowerLimit": 400, "lowerVerticalReference": "AMSL",
+     "horizontalProjection": {"type": "Polygon", "coordinates": [[[8.5, 47.35], [8.6, 47.35], [8.6, 47.4], [8.5, 47.35]]]}}]}]}"#;
+
+const ED_318: &str = r#"{"type": "FeatureCollection", "features": [
+  {"type": "Feature", "properties": {"identifier": "B1", "name": [{"lang": "en-GB", "text": "Aerodrome"}], "type": "PROHIBITED"},
+   "geometry": {"type": "GeometryCollection", "geometries": [
+     {"type": "Point", "coordinates": [8.5, 47.4], "extent": {"subType": "Circle", "radius": 900},
+      "layer": {"lower": 0, "lowerReference": "AGL", "upper": 600, "upperReference": "AMSL", "uom": "m"}},
+     {"type": "MultiPolygon", "coordinates": [[[[8.5, 47.35], [8.6, 47.35], [8.6, 47.4], [8.5, 47.35]]]],
+      "layer": {"lower": 300, "lowerReference": "WGS84", "uom": "ft"}}]}}]}"#;
+
+/// Within the limits that a service has by default, for a flight whose ends are known.
+fn convert_for_a_flight(text: &[u8], syntax: Syntax) -> Result<Conversion, ImportError> {
+    let flight = Flight {
+        start: "47.3,8.5,500".parse().ok(),
+        target: "47.4,8.6,520.5".parse().ok(),
+        within_m: None,
+    };
+    import::convert(text, syntax, MOST, &flight)
+}
+
 /// Within the limits that a service has by default.
 fn convert(text: &[u8], syntax: Syntax) -> Result<Conversion, ImportError> {
-    let most = Most {
-        threats: 10_000,
-        polygon_vertices: 20_000,
-    };
-    import::convert(text, syntax, most)
+    import::convert(text, syntax, MOST, &Flight::default())
 }
 
 #[test]
@@ -58,8 +108,14 @@ fn complete_files_are_read() {
         (GEOJSON, &["cylinder", "polygon", "polygon"][..]),
         (KML, &["cylinder", "polygon"]),
         (PLAN, &["cylinder", "polygon"]),
+        (OPENAIR, &["cylinder", "polygon"]),
+        (ED_269, &["cylinder", "polygon"]),
+        (ED_318, &["cylinder", "polygon"]),
     ] {
-        let read = convert(file.as_bytes(), Syntax::of(file.as_bytes())).expect("a scenario");
+        let text = file.as_bytes();
+        let read = convert(text, Syntax::of(text));
+        let read = read.or_else(|_| convert_for_a_flight(text, Syntax::of(text)));
+        let read = read.expect("a scenario");
         let threats = read.scenario["threats"].as_array().expect("a list");
         let kinds: Vec<_> = threats.iter().map(|threat| &threat["kind"]).collect();
         assert_eq!(kinds, expected, "{file}");
@@ -145,6 +201,7 @@ fn namespaces_and_attributes_are_read_in_linear_time() {
 
 fn use_up(bytes: &[u8]) {
     let _ = at_little_cost(|| convert(bytes, Syntax::of(bytes)));
+    let _ = at_little_cost(|| convert_for_a_flight(bytes, Syntax::of(bytes)));
 }
 
 proptest! {

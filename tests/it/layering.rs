@@ -26,7 +26,7 @@ const ROOMS: [(&str, Imports); 19] = [
     ("seeding", Above),
     ("planner", Above),
     ("export", Above),
-    ("import", Only(&[])),
+    ("import", Only(&["geometry"])),
     ("job", Above),
     ("config", Only(&["scenario"])),
     ("telemetry", Only(&["config"])),

@@ -48,6 +48,36 @@ test('files are opened and dropped: a scenario, GeoJSON, KML', async () => {
   await page.done();
 });
 
+test('a map of zones is laid over a scenario in degrees', async () => {
+  const page = await open(chrome, site.url);
+  await page.selectOption('#source', 'paper-1');
+  await drawn(page, 3);
+  const zone = (name, center, floor) => `AC R\nAN ${name}\nAL ${floor}\nAH 9500ft MSL\nV X=${center}\nDC 0.2\n`;
+  const map = `* Zones\n${zone('range', '36:30:00 N 084:12:00 W', 'GND')}${zone('plant', '36:30:30 N 084:11:00 W', '500ft AGL')}${zone('abroad', '47:00:00 N 008:00:00 E', 'GND')}`;
+  await drop(page, 'zones.txt', map, 'text/plain');
+  await page.waitForFunction(() => /zones\.txt holds no scenario: no start and no target in the file.*over a scenario in degrees/.test(document.getElementById('notice').textContent));
+  const kml = readFileSync(new URL('./map.kml', import.meta.url), 'utf8');
+  await drop(page, 'map.kml', kml, '');
+  await page.waitForFunction(() => globalThis.noctule.document().start?.lat === 36.49);
+  const before = await document_(page);
+  await drop(page, 'zones.txt', map, 'text/plain');
+  await drawn(page, before.threats.length + 2);
+  const after = await document_(page);
+  assert.deepEqual({ ...after, area: before.area, threats: before.threats }, { area: undefined, ...before });
+  assert.deepEqual(after.threats.slice(before.threats.length).map(({ name, top }) => [name, top]), [['range', 9500 * 0.3048], ['plant', 9500 * 0.3048]]);
+  assert.ok(after.area.min.lat < after.start.lat);
+  const said = await page.textContent('#notice');
+  assert.match(said, /2 threats were added\. Taken for granted: area \(\d+ m beyond start and target .* left out: 1\); threats \(1 of them without a base/);
+  await page.click('#undo');
+  await drawn(page, before.threats.length);
+  // Heights above another datum are not mixed.
+  await drop(page, 'ellipsoid.json', JSON.stringify({ ...before, altitude_datum: 'ellipsoid' }), 'application/json');
+  await page.waitForFunction(() => globalThis.noctule.document().altitude_datum === 'ellipsoid');
+  await drop(page, 'zones.txt', map, 'text/plain');
+  await page.waitForFunction(() => /above another datum \(msl\) than those of the scenario \(ellipsoid\)/.test(document.getElementById('notice').textContent));
+  await page.done();
+});
+
 test('a file that is no scenario is refused in words, and leaves the page as it was', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);

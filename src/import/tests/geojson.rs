@@ -251,11 +251,11 @@ fn a_file_without_ends_is_no_scenario() {
     };
     check(
         r#"{"type": "FeatureCollection", "features": []}"#,
-        "no start and no target in the file: a point of that name makes one",
+        "no start and no target in the file: a point of that name makes one, or the options start and target say where they are",
     );
     check(
         &point("start", json!([1, 2, 3])).to_string(),
-        "no target in the file: a point of that name makes one",
+        "no target in the file: a point of that name makes one, or the options start and target say where they are",
     );
     check(
         r#"{"type": "FeatureCollection"}"#,

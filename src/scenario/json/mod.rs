@@ -18,7 +18,6 @@ mod path;
 mod planner;
 mod point;
 mod ranges;
-mod ring;
 mod sketch;
 mod terrain;
 mod threats;

@@ -1,6 +1,7 @@
 //! `threats`: cylinders and polygons.
 
 use crate::geometry::Point2;
+use crate::geometry::simple::{self, RingFault};
 use crate::scenario::limits::Limits;
 use crate::threat::{Cylinder, Polygon, Shape, Threat};
 
@@ -9,7 +10,6 @@ use super::fault::Faults;
 use super::fields::Fields;
 use super::path::Path;
 use super::ranges::{COORDINATE, MARGIN, RADIUS};
-use super::ring::{self, RingFault};
 use super::tree::Node;
 use super::value::{At, figure, name};
 
@@ -155,7 +155,7 @@ fn vertices(at: At<'_>, chart: &Chart, faults: &mut Faults) -> Option<Vec<Point2
     if vertices.len() > 1 && vertices.first() == vertices.last() {
         vertices.pop();
     }
-    let Err(found) = ring::check(&vertices) else {
+    let Err(found) = simple::check(&vertices) else {
         return Some(vertices);
     };
     for fault in found {

@@ -1,4 +1,4 @@
-//! Whether a polygon's vertices form a simple ring.
+//! Whether a polygon's vertices form a simple ring, and the convex hull of those that do not.
 //!
 //! A sweep over the vertices (Shamos and Hoey, "Geometric intersection problems", FOCS 1976) with exact orientation
 //! predicates: O(n log n) comparisons for any shape.
@@ -6,12 +6,13 @@
 use std::cmp::Ordering;
 
 use robust::{Coord, orient2d};
+use spade::{DelaunayTriangulation, Triangulation as _};
 
-use crate::geometry::Point2;
+use super::Point2;
 
 /// Why vertices form no simple ring. Numbers are vertex indices; an edge has the index of its first vertex.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum RingFault {
+pub enum RingFault {
     /// Fewer than three.
     TooFew,
     /// All on one line.
@@ -27,7 +28,7 @@ pub(super) enum RingFault {
 /// # Errors
 /// All pairs of repeated vertices, each with the one before at the same place, or the first other [`RingFault`] found;
 /// indices are in ascending order.
-pub(super) fn check(vertices: &[Point2]) -> Result<(), Vec<RingFault>> {
+pub fn check(vertices: &[Point2]) -> Result<(), Vec<RingFault>> {
     if vertices.len() < 3 {
         return Err(vec![RingFault::TooFew]);
     }
@@ -54,6 +55,18 @@ pub(super) fn check(vertices: &[Point2]) -> Result<(), Vec<RingFault>> {
         .map_err(|fault| vec![fault])
 }
 
+/// The corners of the convex hull of `points`, in order; fewer than three where all lie on one line.
+#[must_use]
+pub fn hull(points: &[Point2]) -> Vec<Point2> {
+    let points = points.iter().map(|at| spade::Point2::new(at.x, at.y));
+    let Ok(delaunay) = DelaunayTriangulation::<spade::Point2<f64>>::bulk_load(points.collect())
+    else {
+        return Vec::new();
+    };
+    let corners = delaunay.convex_hull().map(|edge| edge.from().position());
+    corners.map(|at| Point2::new(at.x, at.y)).collect()
+}
+
 /// All vertices that are at the place of an earlier one, given the order in which the sweep passes them.
 fn repeated(vertices: &[Point2], order: &[usize]) -> Vec<RingFault> {
     let pairs = order.windows(2).map(|pair| [pair[0], pair[1]]);
@@ -75,7 +88,7 @@ fn along(a: Point2, b: Point2) -> Ordering {
 }
 
 /// The side of `c` seen along a to b: `Greater` left, `Less` right, `Equal` on the line; exact.
-pub(super) fn turn(a: Point2, b: Point2, c: Point2) -> Ordering {
+fn turn(a: Point2, b: Point2, c: Point2) -> Ordering {
     let coord = |point: Point2| Coord {
         x: point.x,
         y: point.y,

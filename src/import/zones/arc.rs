@@ -1,0 +1,79 @@
+//! Arcs of an outline, as corners that leave nothing of the zone out.
+
+use std::f64::consts::TAU;
+
+use super::super::place::Place;
+use crate::geometry::Point2;
+use crate::geometry::geodesy::{LatLon, TangentPlane};
+
+/// Steps of a whole circle: between two of them an arc strays from its corners by a thousandth of its radius.
+const STEPS: f64 = 72.0;
+
+/// A part of a circle, or of a spiral where the ends are not equally far from the centre.
+#[derive(Debug)]
+pub(super) struct Arc {
+    plane: TangentPlane,
+    /// Bearing in radians, clockwise from north, and distance in metres.
+    from: [f64; 2],
+    /// How far it turns, radians, above 0 where clockwise.
+    turn: f64,
+    to_radius: f64,
+}
+
+impl Arc {
+    /// Round `center` from one bearing and distance to another.
+    pub(super) fn new(center: Place, from: [f64; 2], to: [f64; 2], is_clockwise: bool) -> Self {
+        let turn = (to[0] - from[0]).rem_euclid(TAU);
+        // From a bearing to itself it is a whole circle.
+        let turn = match (is_clockwise, turn > 0.0) {
+            (true, true) => turn,
+            (false, true) => turn - TAU,
+            (true, false) => TAU,
+            (false, false) => -TAU,
+        };
+        Self {
+            plane: TangentPlane::at(LatLon::from(center), 0.0),
+            from,
+            turn,
+            to_radius: to[1],
+        }
+    }
+
+    /// Round `center` from one place to another.
+    pub(super) fn between(center: Place, from: Place, to: Place, is_clockwise: bool) -> Self {
+        let plane = TangentPlane::at(LatLon::from(center), 0.0);
+        let [from, to] = [from, to].map(|place| {
+            let at = plane.local(LatLon::from(place)).coords;
+            [libm::atan2(at.x, at.y), at.norm()]
+        });
+        Self::new(center, from, to, is_clockwise)
+    }
+
+    pub(super) fn is_clockwise(&self) -> bool {
+        self.turn > 0.0
+    }
+
+    /// Its ends, and corners between them: on it, or where `outside` as far outside as keeps all of it within.
+    pub(super) fn corners(&self, outside: bool) -> Vec<Place> {
+        let steps = (self.turn.abs() / TAU * STEPS).ceil();
+        let at = |share: f64, out: f64| {
+            let [bearing, radius] = self.from;
+            let (sin, cos) = libm::sincos(bearing + self.turn * share);
+            let radius = (radius + (self.to_radius - radius) * share) * out;
+            Place::from(self.plane.geodetic(Point2::new(radius * sin, radius * cos)))
+        };
+        let mut corners = vec![at(0.0, 1.0)];
+        let mut step = 0.0;
+        while step < steps {
+            if outside {
+                let half = self.turn / steps / 2.0;
+                corners.push(at((step + 0.5) / steps, 1.0 / libm::cos(half)));
+            }
+            step += 1.0;
+            if !outside || step >= steps {
+                corners.push(at(step / steps, 1.0));
+            }
+        }
+        corners
+    }
+}

@@ -1,0 +1,213 @@
+//! OpenAir: airspaces in lines of text, each from a line `AC` to the next.
+//!
+//! The library reads one airspace at a time, so that one that it cannot read takes nothing from the next.
+
+use std::f64::consts::TAU;
+
+use openair::{
+    Airspace, AirspaceType, Altitude, Class, Coord, Direction, Geometry, PolygonSegment,
+};
+
+use super::super::draft::Draft;
+use super::super::flight::Flight;
+use super::super::place::Place;
+use super::super::{Conversion, ImportError, Most, text};
+use super::arc::Arc;
+use super::{FOOT_M, Height, Outline};
+use crate::geometry::geodesy::{LatLon, TangentPlane};
+use crate::geometry::ring;
+
+/// Metres of a nautical mile, exactly.
+const MILE_M: f64 = 1852.0;
+
+/// Whether a text may be OpenAir: its first line that is not empty is a comment or a record.
+pub(in super::super) fn is_one(text: &[u8]) -> bool {
+    let begin = text.trim_ascii_start();
+    match begin {
+        [b'*', ..] => true,
+        [first, second, third, ..] => {
+            first.is_ascii_uppercase() && second.is_ascii_uppercase() && third.is_ascii_whitespace()
+        }
+        _ => false,
+    }
+}
+
+/// Convert a file to a scenario.
+pub(in super::super) fn convert(
+    bytes: &[u8],
+    most: Most,
+    flight: &Flight,
+) -> Result<Conversion, ImportError> {
+    let text = text::read(bytes);
+    let airspaces = airspaces(&text);
+    if airspaces.is_empty() {
+        return Err(ImportError::no_scenario(
+            "no airspace: text is read as OpenAir, where each begins with a line AC",
+        ));
+    }
+    let mut draft = Draft::new("msl", most, flight);
+    for (row, lines) in airspaces {
+        let mut read = openair::parse(lines.as_bytes());
+        let at = format!("line {row}");
+        match read.next() {
+            Some(Ok(airspace)) => add(&mut draft, &at, &airspace),
+            Some(Err(reason)) => draft.leave(at, reason),
+            None => draft.leave(at, "no airspace"),
+        }
+    }
+    draft.finish()
+}
+
+/// The lines of each airspace, with the number of the first.
+fn airspaces(text: &str) -> Vec<(usize, &str)> {
+    let mut begins: Vec<(usize, usize)> = Vec::new();
+    let mut pos = 0;
+    for (index, line) in text.split_inclusive('\n').enumerate() {
+        let record = line.trim_start().as_bytes();
+        if let [b'A', b'C', rest, ..] = record
+            && rest.is_ascii_whitespace()
+        {
+            begins.push((index + 1, pos));
+        }
+        pos += line.len();
+    }
+    let ends = begins.iter().skip(1).map(|(_, pos)| *pos);
+    let ends = ends.chain([text.len()]);
+    let of = |((row, begin), end): (&(usize, usize), usize)| (*row, &text[*begin..end]);
+    begins.iter().zip(ends).map(of).collect()
+}
+
+fn add(draft: &mut Draft, at: &str, airspace: &Airspace) {
+    let at = match &airspace.name {
+        Some(name) => format!("{at}: {}", super::super::facts::begin(name)),
+        None => at.to_owned(),
+    };
+    if let Some(open) = open(airspace) {
+        return draft.leave(at, open);
+    }
+    let outlines = outline(&airspace.geom).map(|outline| vec![outline]);
+    let heights = [&airspace.lower_bound, &airspace.upper_bound].map(height);
+    super::add(draft, &at, airspace.name.as_deref(), outlines, heights);
+}
+
+/// Why an airspace need not be kept clear of, if so. The type, where there is one, says more than the class.
+fn open(airspace: &Airspace) -> Option<&'static str> {
+    match &airspace.type_ {
+        Some(
+            AirspaceType::FlightInformationRegion
+            | AirspaceType::UpperFlightInformationRegion
+            | AirspaceType::FlightInformationServiceSector
+            | AirspaceType::RemoteCommunicationSector
+            | AirspaceType::TransponderRecommendedZone
+            | AirspaceType::VisualFlightRulesRoute
+            | AirspaceType::VisualFlightRulesSector,
+        ) => Some("a region or a sector of information, which closes nothing"),
+        None
+        | Some(
+            AirspaceType::NoType
+            | AirspaceType::Airway
+            | AirspaceType::ControlArea
+            | AirspaceType::LowerTrafficArea
+            | AirspaceType::TerminalManoeuvringArea
+            | AirspaceType::UpperTrafficArea,
+        ) => matches!(airspace.class, Class::E | Class::F | Class::G)
+            .then_some("class E, F or G, which needs no clearance"),
+        Some(_) => None,
+    }
+}
+
+fn height(altitude: &Altitude) -> Height {
+    match altitude {
+        Altitude::Gnd | Altitude::Unlimited | Altitude::FeetAgl(0) => Height::Open,
+        Altitude::FeetAmsl(feet) => Height::AboveSea(f64::from(*feet) * FOOT_M),
+        Altitude::FlightLevel(level) => Height::Level(f64::from(*level) * 100.0 * FOOT_M),
+        Altitude::FeetAgl(_) | Altitude::Other(_) => Height::Unknown,
+    }
+}
+
+fn place(coord: &Coord) -> Result<Place, String> {
+    Place::new(coord.lng, coord.lat)
+}
+
+/// From nautical miles, with the digits of the file.
+fn metres(miles: f32) -> f64 {
+    let written: f64 = miles
+        .to_string()
+        .parse()
+        .unwrap_or_else(|_| f64::from(miles));
+    written * MILE_M
+}
+
+fn outline(geometry: &Geometry) -> Result<Outline, String> {
+    match geometry {
+        Geometry::Circle {
+            centerpoint,
+            radius,
+        } => Ok(Outline::Circle(place(centerpoint)?, metres(*radius))),
+        Geometry::Polygon { segments } => {
+            let parts: Result<Vec<Part>, String> = segments.iter().map(Part::of).collect();
+            Ok(Outline::Ring(ring_of(&parts?)))
+        }
+    }
+}
+
+/// A part of an outline.
+enum Part {
+    Corner(Place),
+    Arc(Arc),
+}
+
+impl Part {
+    fn of(segment: &PolygonSegment) -> Result<Self, String> {
+        let is_clockwise = |direction: Direction| direction == Direction::Cw;
+        Ok(match segment {
+            PolygonSegment::Point(coord) => Self::Corner(place(coord)?),
+            PolygonSegment::Arc(arc) => Self::Arc(Arc::between(
+                place(&arc.centerpoint)?,
+                place(&arc.start)?,
+                place(&arc.end)?,
+                is_clockwise(arc.direction),
+            )),
+            PolygonSegment::ArcSegment(arc) => {
+                let radius = metres(arc.radius);
+                if !(radius.is_finite() && radius > 0.0) {
+                    return Err(format!("the radius of an arc is {radius}, must be > 0"));
+                }
+                let [from, to] = [arc.angle_start, arc.angle_end]
+                    .map(|degrees| [f64::from(degrees) * TAU / 360.0, radius]);
+                Self::Arc(Arc::new(
+                    place(&arc.centerpoint)?,
+                    from,
+                    to,
+                    is_clockwise(arc.direction),
+                ))
+            }
+        })
+    }
+
+    fn corners(&self, outside: bool) -> Vec<Place> {
+        match self {
+            Self::Corner(corner) => vec![*corner],
+            Self::Arc(arc) => arc.corners(outside),
+        }
+    }
+}
+
+/// The corners of all parts. An arc bulges out where it turns the same way as the whole ring does.
+fn ring_of(parts: &[Part]) -> Vec<Place> {
+    let on_arcs: Vec<Place> = parts.iter().flat_map(|part| part.corners(false)).collect();
+    let Some(first) = on_arcs.first() else {
+        return on_arcs;
+    };
+    let plane = TangentPlane::at(LatLon::from(*first), 0.0);
+    let points: Vec<_> = on_arcs
+        .iter()
+        .map(|at| plane.local(LatLon::from(*at)))
+        .collect();
+    let is_clockwise = ring::twice_area(&points) < 0.0;
+    let bulges = |part: &Part| matches!(part, Part::Arc(arc) if arc.is_clockwise() == is_clockwise);
+    parts
+        .iter()
+        .flat_map(|part| part.corners(bulges(part)))
+        .collect()
+}

@@ -41,6 +41,20 @@ struct Look {
     survey: Option<Survey>,
 }
 
+/// The name of the dataset in a file: the file's own in lower case, without the extension. Tiles of elevations are named
+/// after their place, and what they are follows after a dot, as in `N36W085.SRTMGL3.hgt`.
+fn dataset_name(path: &Path) -> String {
+    let stem = path.file_stem().and_then(|stem| stem.to_str());
+    let stem = stem.unwrap_or_default().to_ascii_lowercase();
+    let is_tile = path
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("hgt"));
+    match stem.split_once('.') {
+        Some((place, _)) if is_tile => place.to_owned(),
+        _ => stem,
+    }
+}
+
 impl Mounted {
     /// The files of `directory`, which is listed again for every request.
     ///
@@ -109,8 +123,7 @@ impl Mounted {
             if !counts || !path.is_file() {
                 continue;
             }
-            let stem = path.file_stem().and_then(|stem| stem.to_str());
-            let name = stem.unwrap_or_default().to_ascii_lowercase();
+            let name = dataset_name(&path);
             if is_dataset_name(&name) {
                 match files.entry(name) {
                     btree_map::Entry::Vacant(place) => {
@@ -121,7 +134,10 @@ impl Mounted {
                     }
                 }
             } else {
-                self.pass_over(&path, "its name is none that a scenario could use");
+                self.pass_over(
+                    &path,
+                    "a dataset's name has letters, digits, and after the first of them - and _: rename the file",
+                );
             }
         }
         Ok(files)

@@ -121,11 +121,11 @@ pub(super) fn read(file: &Path) -> anyhow::Result<Vec<u8>> {
     read().with_context(|| format!("cannot read {}", file.display()))
 }
 
-/// Write a document as lines; `None` is standard output.
+/// Write a document as lines; `None` and `-` are standard output.
 pub(super) fn write(out: Option<&Path>, document: &str) -> anyhow::Result<()> {
     let document = document.strip_suffix('\n').unwrap_or(document);
     let lines = format!("{document}\n");
-    match out {
+    match out.filter(|file| *file != Path::new("-")) {
         Some(file) => {
             fs::write(file, lines).with_context(|| format!("cannot write {}", file.display()))
         }

@@ -1,6 +1,6 @@
 //! `noctule healthcheck`: one request to a running service, for images that have no curl.
 
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
@@ -30,10 +30,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         bail!("{url} must begin with http://");
     }
     let authority = url.authority().context("the URL names no host")?;
-    let address = (
-        authority.host().trim_matches(['[', ']']),
-        authority.port_u16().unwrap_or(80),
-    );
+    let port = match authority.as_str().rsplit_once(authority.host()) {
+        Some((_, "" | ":")) => 80,
+        _ => authority
+            .port_u16()
+            .filter(|port| *port > 0)
+            .with_context(|| format!("{url}: the port must be a whole number from 1 to 65535"))?,
+    };
+    let address = (authority.host().trim_matches(['[', ']']), port);
     let path = url.path_and_query().map(PathAndQuery::as_str);
     // The page at the root is there whether or not the service is ready.
     let path = path.filter(|path| *path != "/").unwrap_or("/readyz");
@@ -58,9 +62,13 @@ fn ask(address: (&str, u16), host: &str, path: &str) -> anyhow::Result<String> {
     let mut head = [0; 32];
     let mut filled = 0;
     while filled < head.len() {
-        match stream.read(&mut head[filled..])? {
-            0 => break,
-            n => filled += n,
+        match stream.read(&mut head[filled..]) {
+            Ok(0) => break,
+            Ok(n) => filled += n,
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                bail!("nothing was sent within {} s", TIMEOUT.as_secs())
+            }
+            Err(error) => return Err(error.into()),
         }
     }
     Ok(String::from_utf8_lossy(&head[..filled]).into_owned())

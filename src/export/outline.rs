@@ -1,7 +1,7 @@
 //! Threats as maps show them: rings in degrees.
 
 use super::chart::Chart;
-use crate::geometry::geodesy::LatLon;
+use crate::geometry::geodesy::{LatLon, wrapped};
 use crate::geometry::ring::{edges, twice_area};
 use crate::geometry::{Point2, Rect};
 use crate::threat::{Shape, Threat};
@@ -12,32 +12,50 @@ const CORNERS: u32 = 72;
 /// Most degrees of longitude between two corners of [`ring_in_degrees`].
 const MOST_DEGREES: f64 = 30.0;
 
+/// How far an edge that is straight in degrees may be from one that is straight on the plane, metres.
+const APART_M: f64 = 0.1;
+
 /// Edges shorter than this, metres, are not divided: one over a pole has no corners between which the degrees are few.
 const SHORTEST_M: f64 = 1.0;
 
-/// Like [`ring`], in degrees, for formats whose edges are straight in degrees. Beside a pole such an edge is far from
-/// the straight one of the plane, so edges that span many degrees of longitude are divided.
+/// A corner on the plane and in degrees.
+type Corner = (Point2, LatLon);
+
+/// Like [`ring`], in degrees, for formats whose edges are straight in degrees. A long one, or one beside a pole, is far
+/// from the straight one of the plane, so such edges are divided; those of a circle, which are near it only, beside a
+/// pole alone.
 pub(super) fn ring_in_degrees(chart: &Chart, threat: &Threat) -> Vec<LatLon> {
+    let most_m = match threat.shape {
+        Shape::Cylinder(_) => f64::INFINITY,
+        Shape::Polygon(_) => APART_M,
+    };
     let mut corners = Vec::new();
     for (from, to) in edges(&ring(threat)) {
         let [from, to] = [from, to].map(|at| (at, chart.place(at)));
         corners.push(from.1);
-        divide(chart, from, to, &mut corners);
+        divide(chart, from, to, most_m, &mut corners);
     }
     corners
 }
 
-/// Add the corners between two places, as many as their degrees of longitude need.
-fn divide(chart: &Chart, from: (Point2, LatLon), to: (Point2, LatLon), corners: &mut Vec<LatLon>) {
-    let apart = (from.1.lon - to.1.lon).abs();
-    if apart.min(360.0 - apart) <= MOST_DEGREES || (from.0 - to.0).norm() < SHORTEST_M {
+/// Add the corners between two others, until those in degrees are at most `most_m` away from the plane's.
+fn divide(chart: &Chart, from: Corner, to: Corner, most_m: f64, corners: &mut Vec<LatLon>) {
+    if (from.0 - to.0).norm() < SHORTEST_M {
         return;
     }
     let middle = nalgebra::center(&from.0, &to.0);
     let middle = (middle, chart.place(middle));
-    divide(chart, from, middle, corners);
+    let east = wrapped(to.1.lon - from.1.lon);
+    let straight = LatLon {
+        lat: f64::midpoint(from.1.lat, to.1.lat),
+        lon: wrapped(from.1.lon + east / 2.0),
+    };
+    if east.abs() <= MOST_DEGREES && straight.distance_m(middle.1) <= most_m {
+        return;
+    }
+    divide(chart, from, middle, most_m, corners);
     corners.push(middle.1);
-    divide(chart, middle, to, corners);
+    divide(chart, middle, to, most_m, corners);
 }
 
 /// The outline of `threat` on the local plane, counter-clockwise seen from above, without repeated first corner. A

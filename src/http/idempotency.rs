@@ -86,7 +86,7 @@ fn read(headers: &HeaderMap) -> Result<Option<String>, Problem> {
         params::refused(IDEMPOTENCY_KEY.as_str(), &text, &allowed)
     };
     if values.next().is_some() {
-        return Err(refused());
+        return Err(params::repeated(IDEMPOTENCY_KEY.as_str()));
     }
     let bare = text.trim();
     let key = bare

@@ -30,7 +30,7 @@ impl Params {
                 return Err(invalid(name.as_str(), &unknown(name.as_str(), known)));
             }
             if pairs[..position].iter().any(|(earlier, _)| earlier == name) {
-                return Err(invalid(name, &format!("{name} is given twice")));
+                return Err(repeated(name));
             }
         }
         Ok(Self(pairs))
@@ -92,6 +92,11 @@ pub(super) fn refused(name: &str, value: &str, allowed: &str) -> Problem {
         name,
         &format!("{name} is {:?}, must be {allowed}", value.as_str()),
     )
+}
+
+/// `name` is given more than once.
+pub(super) fn repeated(name: &str) -> Problem {
+    invalid(name, &format!("{name} is given twice"))
 }
 
 /// `name` is needed beside the others.

@@ -6,12 +6,15 @@ use super::facts::{Facts, OF_A_THREAT, begin};
 use super::flight::Flight;
 use super::near::Near;
 use super::place::Place;
-use super::threat::{Threat, Threats, circle, polygon};
+use super::threat::{Made, Threats, circle, polygon};
 use super::zones::{Widened, Zone};
 use super::{Assumed, Conversion, ImportError, Most, Unused};
 
 /// Most entries in the list of unused parts; the last one counts the rest.
 const MOST_UNUSED: usize = 1000;
+
+/// Why the heights of a polygon's corners are not used.
+pub(super) const HEIGHTS_OF_A_POLYGON: &str = "the heights of a polygon: it is kept clear of at any height, unless its data have a base or a top";
 
 /// Usual altitude limit of unmanned aircraft, metres above ground.
 const CEILING_M: f64 = 120.0;
@@ -134,10 +137,7 @@ impl Draft {
 
     /// A circle with the radius in its facts.
     pub(super) fn circle(&mut self, at: &str, facts: &Facts, center: Place) {
-        match circle(facts, center) {
-            Ok(threat) => self.threat(at, facts, threat),
-            Err(reason) => self.leave(at, reason),
-        }
+        self.threat(at, facts, circle(facts, center));
     }
 
     /// A circle that is drawn as a ring, if these are the facts of one: they say its `center` and its `radius`.
@@ -154,23 +154,25 @@ impl Draft {
 
     /// The outer ring of a polygon, closed or not.
     pub(super) fn polygon(&mut self, at: &str, facts: &Facts, ring: &[[f64; 2]]) {
-        match polygon(facts, ring) {
-            Ok(threat) => self.threat(at, facts, threat),
-            Err(reason) => self.leave(at, reason),
-        }
+        self.threat(at, facts, polygon(facts, ring));
     }
 
-    fn threat(&mut self, at: &str, facts: &Facts, threat: Threat) {
-        if self.keep(threat) {
-            self.leave_beside(at, facts, &OF_A_THREAT);
+    fn threat(&mut self, at: &str, facts: &Facts, made: Result<Made, String>) {
+        match made {
+            Ok(made) => {
+                if self.keep(at, made) {
+                    self.leave_beside(at, facts, &OF_A_THREAT);
+                }
+            }
+            Err(reason) => self.leave(at, reason),
         }
     }
 
     /// A zone of airspace.
     pub(super) fn zone(&mut self, at: &str, zone: Zone) {
         match zone.threat() {
-            Ok((threat, widened)) => {
-                if self.keep(threat) {
+            Ok((made, widened)) => {
+                if self.keep(at, made) {
                     self.widened.join(&widened);
                 }
             }
@@ -179,14 +181,16 @@ impl Draft {
     }
 
     /// Keep a threat, unless it lies elsewhere.
-    fn keep(&mut self, threat: Threat) -> bool {
-        let is_near = self.near.as_ref().is_none_or(|near| near.meets(&threat));
-        if is_near {
-            self.threats.add(threat);
-        } else {
+    fn keep(&mut self, at: &str, (threat, amiss): Made) -> bool {
+        if self.near.as_ref().is_some_and(|near| !near.meets(&threat)) {
             self.n_elsewhere += 1;
+            return false;
         }
-        is_near
+        self.threats.add(threat);
+        for reason in amiss {
+            self.leave(at, reason);
+        }
+        true
     }
 
     fn leave_beside(&mut self, at: &str, facts: &Facts, used: &[&str]) {

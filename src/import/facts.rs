@@ -54,6 +54,9 @@ impl Facts {
                 said.insert(lower, value);
             }
         }
+        if let Some(name @ Value::Number(_)) = said.get_mut("name") {
+            *name = Value::String(name.to_string());
+        }
         let (known, rest): (Map<_, _>, Map<_, _>) =
             said.into_iter().partition(|(name, _)| is_known(name));
         let mut others: Vec<String> = rest
@@ -93,7 +96,7 @@ impl Facts {
         names.iter().any(is_said)
     }
 
-    /// Name of the object.
+    /// Name of the object, if it is a text; a number is one.
     pub(super) fn name(&self) -> Option<&str> {
         self.known.get("name")?.as_str().map(str::trim)
     }

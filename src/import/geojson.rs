@@ -4,13 +4,12 @@
 use geojson::{Feature, GeometryValue, JsonValue, Position};
 use serde_json::Value;
 
-use super::antimeridian;
-use super::draft::Draft;
+use super::draft::{Draft, HEIGHTS_OF_A_POLYGON};
 use super::facts::Facts;
 use super::flight::Flight;
 use super::place::Place;
 use super::zones::ed318;
-use super::{Conversion, ImportError, Most};
+use super::{Conversion, ImportError, Most, antimeridian, edges};
 
 /// Names that older GeoJSON uses for the only reference system of RFC 7946. The last ones mean the latitude first, but
 /// programs that write them put the longitude first all the same, as all GeoJSON does.
@@ -92,6 +91,8 @@ fn feature(draft: &mut Draft, at: &str, value: JsonValue) {
     if ed318::is_one(&value) {
         return ed318::zone(draft, at, &value);
     }
+    let mut value = value;
+    forget_null_heights(&mut value["geometry"]);
     let feature = match serde_json::from_value::<Feature>(value) {
         Ok(feature) => feature,
         Err(error) => return draft.leave(at, error.to_string()),
@@ -100,6 +101,23 @@ fn feature(draft: &mut Draft, at: &str, value: JsonValue) {
     match feature.geometry {
         None => draft.leave(at, "a feature without geometry"),
         Some(shape) => geometry(draft, at, &format!("{at}/geometry"), &facts, &shape.value),
+    }
+}
+
+/// A position may end in a null, where a program has no height to write; the library refuses it.
+fn forget_null_heights(geometry: &mut Value) {
+    match geometry {
+        Value::Object(members) => members.values_mut().for_each(forget_null_heights),
+        Value::Array(items) => {
+            if let [lon, lat, Value::Null] = items.as_slice()
+                && lon.is_number()
+                && lat.is_number()
+            {
+                items.pop();
+            }
+            items.iter_mut().for_each(forget_null_heights);
+        }
+        _ => {}
     }
 }
 
@@ -114,9 +132,9 @@ fn geometry(draft: &mut Draft, at: &str, within: &str, facts: &Facts, value: &Ge
         GeometryValue::Point { coordinates } => point(draft, at, facts, coordinates),
         GeometryValue::Polygon { coordinates } => {
             let rings_at = format!("{within}/coordinates");
-            if let Some(ring) = outer(draft, at, &rings_at, coordinates) {
+            if let Some(ring) = outer(draft, facts, at, &rings_at, coordinates) {
                 for (_, ring) in antimeridian::joined(&[ring]) {
-                    draft.polygon(at, facts, &ring);
+                    draft.polygon(at, facts, &edges::divided(&ring));
                 }
             }
         }
@@ -154,12 +172,13 @@ fn polygons(draft: &mut Draft, within: &str, facts: &Facts, polygons: &[Vec<Vec<
     let (mut indices, mut outer_rings) = (Vec::new(), Vec::new());
     for (index, rings) in polygons.iter().enumerate() {
         let at = place(index);
-        if let Some(ring) = outer(draft, &at, &at, rings) {
+        if let Some(ring) = outer(draft, facts, &at, &at, rings) {
             indices.push(index);
             outer_rings.push(ring);
         }
     }
     for (first, ring) in antimeridian::joined(&outer_rings) {
+        let ring = edges::divided(&ring);
         draft.polygon(&place(indices[first]), facts, &ring);
     }
 }
@@ -167,6 +186,7 @@ fn polygons(draft: &mut Draft, within: &str, facts: &Facts, polygons: &[Vec<Vec<
 /// The outer ring of a polygon, whose list of rings is at `rings_at`.
 fn outer(
     draft: &mut Draft,
+    facts: &Facts,
     at: &str,
     rings_at: &str,
     rings: &[Vec<Position>],
@@ -178,6 +198,10 @@ fn outer(
     for index in 1..=holes.len() {
         let hole = format!("{rings_at}/{index}");
         draft.leave(hole, "the hole of a polygon: all of it is kept clear of");
+    }
+    let is_high = |position: &Position| position.as_slice().get(2).is_some_and(|alt| *alt != 0.0);
+    if outer.iter().any(is_high) && !facts.says_any(&["kind", "base", "top"]) {
+        draft.leave(at, HEIGHTS_OF_A_POLYGON);
     }
     let ring: Option<_> = outer.iter().map(degrees).collect();
     if ring.is_none() {

@@ -7,7 +7,7 @@
 use roxmltree::{Document, Node, ParsingOptions};
 use serde_json::{Map, Value};
 
-use super::draft::Draft;
+use super::draft::{Draft, HEIGHTS_OF_A_POLYGON};
 use super::facts::Facts;
 use super::flight::Flight;
 use super::place::Place;
@@ -179,10 +179,7 @@ fn leave_heights(draft: &mut Draft, at: &str, facts: &Facts, node: &Node) {
     let mode = text_of(node, "altitudeMode");
     let has_heights = mode.is_some_and(|mode| mode != "clampToGround");
     if has_heights && !facts.says_any(&["kind", "base", "top"]) {
-        draft.leave(
-            at,
-            "the heights of a polygon: it is kept clear of at any height, unless its data have a base or a top",
-        );
+        draft.leave(at, HEIGHTS_OF_A_POLYGON);
     }
 }
 
@@ -246,7 +243,7 @@ fn facts(placemark: &Node) -> Facts {
             say(&node, text_of(&node, "value"));
         } else if is(&node, "SchemaData") {
             for simple in node.children().filter(|child| is(child, "SimpleData")) {
-                say(&simple, simple.text().map(str::to_owned));
+                say(&simple, Some(text_in(&simple)));
             }
         }
     }
@@ -263,6 +260,11 @@ fn is(node: &Node, name: &str) -> bool {
 /// The text of a child, trimmed.
 fn text_of(node: &Node, name: &str) -> Option<String> {
     let child = node.children().find(|child| is(child, name))?;
-    let text: String = child.children().filter_map(|part| part.text()).collect();
-    Some(text.trim().to_owned())
+    Some(text_in(&child).trim().to_owned())
+}
+
+/// All text right within `node`; comments, which the library has texts of too, are none.
+fn text_in(node: &Node) -> String {
+    let parts = node.children().filter(Node::is_text);
+    parts.filter_map(|part| part.text()).collect()
 }

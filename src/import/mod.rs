@@ -6,6 +6,7 @@
 
 mod antimeridian;
 mod draft;
+mod edges;
 mod facts;
 mod flight;
 mod geojson;

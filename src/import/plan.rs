@@ -9,7 +9,7 @@ use super::draft::Draft;
 use super::facts::{Facts, begin, shown};
 use super::flight::Flight;
 use super::place::Place;
-use super::{Conversion, ImportError, Most, antimeridian};
+use super::{Conversion, ImportError, Most, antimeridian, edges};
 
 /// MAVLink commands (`MAV_CMD`) that have a position: waypoints and similar, then take-offs and landings.
 const WAYPOINTS: [u64; 6] = [16, 17, 18, 19, 31, 82];
@@ -104,9 +104,13 @@ pub(super) fn convert(
     draft.finish()
 }
 
+/// The home of a mission; one at 0 degrees north and east is what a program writes that does not know it.
 fn home(mission: &Value) -> Option<Home<'_>> {
     let home = &mission["plannedHomePosition"];
-    let place = Place::new(home[1].as_f64()?, home[0].as_f64()?).ok()?;
+    let [lat, lon] = [home[0].as_f64()?, home[1].as_f64()?];
+    let place = Place::new(lon, lat)
+        .ok()
+        .filter(|_| (lat, lon) != (0.0, 0.0))?;
     let alt = &home[2];
     Some(Home { place, alt })
 }
@@ -135,6 +139,7 @@ fn speed(mission: &Value) -> Option<f64> {
 
 fn stops<'d>(draft: &mut Draft, items: &'d [Value], home: Option<Home>) -> Vec<Stop<'d>> {
     let mut stops = Vec::new();
+    let mut flown: Option<(String, f64)> = None;
     for (index, item) in items.iter().enumerate() {
         let at = place_of_item(index);
         if item["type"] != "SimpleItem" {
@@ -146,12 +151,24 @@ fn stops<'d>(draft: &mut Draft, items: &'d [Value], home: Option<Home>) -> Vec<S
             command if moves(command) => {
                 stop(index, item, command, home).map(|stop| stops.push(stop))
             }
-            CHANGE_SPEED => changed_speed(item).map(|speed| draft.cruise_speed = Some(speed)),
+            CHANGE_SPEED => changed_speed(item).map(|speed| {
+                if let Some((earlier, before)) = flown.replace((at.clone(), speed))
+                    && (before - speed).abs() > 0.0
+                {
+                    draft.leave(
+                        earlier,
+                        "a speed that a later item changes, where a scenario has one",
+                    );
+                }
+            }),
             command => Err(format!("command {command}, which no scenario has")),
         };
         if let Err(reason) = used {
             draft.leave(at, reason);
         }
+    }
+    if let Some((_, speed)) = flown {
+        draft.cruise_speed = Some(speed);
     }
     stops
 }
@@ -332,6 +349,7 @@ fn polygons(draft: &mut Draft, fences: &[Value]) {
         }
     }
     for (first, ring) in antimeridian::joined(&rings) {
+        let ring = edges::divided(&ring);
         draft.polygon(&place(indices[first]), &Facts::default(), &ring);
     }
 }

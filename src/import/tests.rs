@@ -116,7 +116,7 @@ fn files_of_too_many_threats_are_refused() {
         geojson::collection(&[geojson::ends(), vec![circle; many]].concat().into())
     };
     let parts = |many: usize| {
-        let triangle = json!([[[8.5, 47.3], [8.6, 47.3], [8.6, 47.4], [8.5, 47.3]]]);
+        let triangle = json!([[[8.5, 47.3], [8.51, 47.3], [8.51, 47.31], [8.5, 47.3]]]);
         let coordinates = vec![triangle; many];
         let parts = geojson::feature(
             json!({}),
@@ -141,7 +141,7 @@ fn files_of_too_many_threats_are_refused() {
     let fences = |many: usize| {
         let item = json!({"type": "SimpleItem", "command": 16, "frame": 0,
             "params": [0, 0, 0, null, 47.3, 8.5, 30]});
-        let corners = [[47.3, 8.5], [47.3, 8.6], [47.4, 8.6]];
+        let corners = [[47.3, 8.5], [47.3, 8.51], [47.31, 8.51]];
         let fence = json!({"inclusion": false, "polygon": corners});
         let plan = json!({"fileType": "Plan", "mission": {"items": [item, item]},
             "geoFence": {"polygons": vec![fence; many]}});

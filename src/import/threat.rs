@@ -16,6 +16,9 @@ pub(super) struct Threat {
     top: Option<f64>,
 }
 
+/// A threat, and what of the file it is made without, because that makes no sense.
+pub(super) type Made = (Threat, Vec<String>);
+
 /// Lengths in metres.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Shape {
@@ -106,24 +109,34 @@ impl Shape {
 }
 
 impl Threat {
-    /// Between two heights, or one, or none.
+    /// Between two heights, a base and a top, or one, or none. Where they make no sense it has none: to
+    /// leave the threat out would let a route through.
     pub(super) fn new(
         name: Option<String>,
         shape: Shape,
-        base: Option<f64>,
-        top: Option<f64>,
-    ) -> Result<Self, String> {
-        if let (Some(base), Some(top)) = (base, top)
-            && base >= top
-        {
-            return Err(format!("base is {base}, must be < the top, {top}"));
-        }
-        Ok(Self {
+        heights: Result<[Option<f64>; 2], String>,
+    ) -> Made {
+        let heights = heights.and_then(|heights| match heights {
+            [Some(base), Some(top)] if base >= top => {
+                Err(format!("base is {base}, must be < the top, {top}"))
+            }
+            heights => Ok(heights),
+        });
+        let (heights, amiss) = match heights {
+            Ok(heights) => (heights, Vec::new()),
+            Err(reason) => (
+                [None, None],
+                vec![format!("{reason}: it is kept clear of at any height")],
+            ),
+        };
+        let [base, top] = heights;
+        let threat = Self {
             name,
             shape,
             base,
             top,
-        })
+        };
+        (threat, amiss)
     }
 
     fn json(self) -> Value {
@@ -157,20 +170,11 @@ impl Threat {
 }
 
 /// A circle with the radius in its facts.
-pub(super) fn circle(facts: &Facts, center: Place) -> Result<Threat, String> {
+pub(super) fn circle(facts: &Facts, center: Place) -> Result<Made, String> {
     let radius = facts.number("radius")?.unwrap_or_default();
-    let mut shape = Shape::circle(center, radius)?;
-    if let Some(given) = facts.number("influence")? {
-        if given < radius {
-            return Err(format!(
-                "influence is {given}, must be >= the radius, {radius}"
-            ));
-        }
-        if let Shape::Cylinder { influence, .. } = &mut shape {
-            *influence = given;
-        }
-    }
-    between_heights(shape, facts)
+    let shape = Shape::circle(center, radius)?;
+    let soft = at_least("influence", radius, facts);
+    Ok(with_facts(shape, soft, facts))
 }
 
 /// The outer ring of a polygon, closed or not.
@@ -178,7 +182,7 @@ pub(super) fn circle(facts: &Facts, center: Place) -> Result<Threat, String> {
     clippy::float_cmp,
     reason = "a ring is closed by its very first corner"
 )]
-pub(super) fn polygon(facts: &Facts, ring: &[[f64; 2]]) -> Result<Threat, String> {
+pub(super) fn polygon(facts: &Facts, ring: &[[f64; 2]]) -> Result<Made, String> {
     let open = match ring {
         [first, between @ .., last] if first == last => &ring[..=between.len()],
         _ => ring,
@@ -191,15 +195,30 @@ pub(super) fn polygon(facts: &Facts, ring: &[[f64; 2]]) -> Result<Threat, String
     }
     let corners = open.iter().map(|[lon, lat]| Place::new(*lon, *lat));
     let vertices: Result<Vec<Place>, String> = corners.collect();
-    let margin = facts.number("margin")?.unwrap_or(0.0);
-    if margin < 0.0 {
-        return Err(format!("margin is {margin}, must be >= 0"));
-    }
-    let vertices = vertices?;
-    between_heights(Shape::Polygon { vertices, margin }, facts)
+    let soft = at_least("margin", 0.0, facts);
+    Ok(with_facts(Shape::polygon(vertices?), soft, facts))
 }
 
-fn between_heights(shape: Shape, facts: &Facts) -> Result<Threat, String> {
-    let (base, top) = (facts.number("base")?, facts.number("top")?);
-    Threat::new(facts.name().map(str::to_owned), shape, base, top)
+/// The number of this name, if there is one.
+fn at_least(name: &str, least: f64, facts: &Facts) -> Result<Option<f64>, String> {
+    match facts.number(name)? {
+        Some(given) if given < least => Err(format!("{name} is {given}, must be >= {least}")),
+        given => Ok(given),
+    }
+}
+
+/// The shape with its soft zone, between the heights of its facts.
+fn with_facts(mut shape: Shape, soft: Result<Option<f64>, String>, facts: &Facts) -> Made {
+    let soft = soft.map_err(|reason| format!("{reason}: it has no soft zone"));
+    if let Ok(Some(given)) = soft {
+        match &mut shape {
+            Shape::Cylinder { influence, .. } => *influence = given,
+            Shape::Polygon { margin, .. } => *margin = given,
+        }
+    }
+    let number = |name| facts.number(name);
+    let heights = number("base").and_then(|base| Ok([base, number("top")?]));
+    let (threat, mut amiss) = Threat::new(facts.name().map(str::to_owned), shape, heights);
+    amiss.extend(soft.err());
+    (threat, amiss)
 }

@@ -43,7 +43,7 @@ impl MeasuredStore {
         operation: &'static str,
         done: Result<T, StoreError>,
     ) -> Result<T, StoreError> {
-        if let Err(StoreError::Unavailable { .. }) = done {
+        if let Err(StoreError::Unavailable { .. } | StoreError::InUse(_)) = done {
             self.instruments.metrics.store_failed(operation);
         }
         done

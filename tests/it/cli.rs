@@ -230,6 +230,44 @@ async fn healthcheck_exits_0_when_the_service_is_ready() {
     assert_eq!(elsewhere.status.code(), Some(1));
     let reason = String::from_utf8(elsewhere.stderr).expect("UTF-8");
     assert!(reason.contains("answers 404"), "{reason}");
+    // A port that is none is not that of the web.
+    for port in ["99999", "0", "65536"] {
+        let url = format!("http://127.0.0.1:{port}/readyz");
+        let refused = run(&["healthcheck", "--url", &url], "");
+        assert_eq!(refused.status.code(), Some(1));
+        let reason = String::from_utf8(refused.stderr).expect("UTF-8");
+        let expected = "the port must be a whole number from 1 to 65535";
+        assert!(reason.contains(expected), "{reason}");
+    }
+}
+
+/// As it is standard input for files that are read.
+#[test]
+fn a_dash_is_standard_output() {
+    let document = scenario().to_string();
+    let waypoints = |arguments: &[&str]| -> Value {
+        let planned = run(arguments, &document);
+        assert_eq!(planned.status.code(), Some(0), "{planned:?}");
+        let result: Value = serde_json::from_slice(&planned.stdout).expect("a result");
+        result["waypoints"].clone()
+    };
+    assert_eq!(
+        waypoints(&["plan", "-", "--out", "-"]),
+        waypoints(&["plan", "-"])
+    );
+}
+
+#[test]
+fn a_measurement_whose_report_could_not_be_kept_is_not_begun() {
+    let file = tempfile::NamedTempFile::new().expect("a temporary file");
+    let out = file.path().to_str().expect("UTF-8");
+    let refused = run(&["bench", "paper", "--seeds", "1000", "--out", out], "");
+    assert_eq!(refused.status.code(), Some(1));
+    let reason = String::from_utf8(refused.stderr).expect("UTF-8");
+    assert!(
+        reason.contains(&format!("cannot make the directory {out}")),
+        "{reason}"
+    );
 }
 
 /// Such as after `| head -1`.

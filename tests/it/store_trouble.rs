@@ -130,6 +130,14 @@ async fn a_second_process_waits_until_the_first_is_gone() {
     let second = Service::start(directory.path(), &[]);
     let detail = second.until_ready(503).await;
     assert!(detail.contains("another process"), "{detail}");
+    // What the alert on a failing store looks at.
+    let metrics = second.bytes("/metrics").await;
+    let failures: f64 = String::from_utf8_lossy(&metrics)
+        .lines()
+        .filter(|line| line.starts_with("noctule_store_operation_failures_total{"))
+        .filter_map(|line| line.rsplit(' ').next()?.parse::<f64>().ok())
+        .sum();
+    assert!(failures > 0.0);
     first.until_ready(200).await;
     first.kill();
     second.until_ready(200).await;

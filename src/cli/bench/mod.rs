@@ -19,6 +19,7 @@ mod summary;
 mod table;
 mod trial;
 
+use std::fs;
 use std::path::PathBuf;
 
 use anyhow::Context;
@@ -43,7 +44,8 @@ pub(super) enum Command {
     Serve(serve::Arguments),
     /// Measure a NATS system under load: rates compared with a bare client, workers that sleep, a day's load
     Cluster(cluster::Arguments),
-    /// Print the violation and cost of routes from standard input, for searches outside of this program
+    /// Print the violation and cost of routes from standard input, for searches outside of this program: each line is a JSON
+    /// array of routes, a route an array of its free waypoints [x, y, z]
     Price(price::Arguments),
 }
 
@@ -85,9 +87,15 @@ pub(super) fn run(command: &Command) -> anyhow::Result<u8> {
                 serve::measure(arguments, cases)
             })
         }),
-        Command::Random(arguments) => random::measure(arguments)
+        Command::Random(arguments) => arguments
+            .output
+            .make_ready()
+            .and_then(|()| random::measure(arguments))
             .and_then(|report| write(&report, &arguments.output, "random")),
-        Command::Cluster(arguments) => cluster::measure(arguments)
+        Command::Cluster(arguments) => arguments
+            .output
+            .make_ready()
+            .and_then(|()| cluster::measure(arguments))
             .and_then(|report| write(&report, &arguments.output, "cluster")),
         Command::Price(arguments) => price::run(arguments),
     };
@@ -110,8 +118,20 @@ fn report(
     name: &str,
     measure: impl FnOnce(&[Case]) -> anyhow::Result<Report>,
 ) -> anyhow::Result<()> {
+    common.output.make_ready()?;
     let report = measure(&case::cases(&common.scenario)?)?;
     write(&report, &common.output, name)
+}
+
+impl Output {
+    /// Make the directory, so that one that cannot be is known before the measurement.
+    fn make_ready(&self) -> anyhow::Result<()> {
+        let Some(directory) = &self.out else {
+            return Ok(());
+        };
+        fs::create_dir_all(directory)
+            .with_context(|| format!("cannot make the directory {}", directory.display()))
+    }
 }
 
 fn write(report: &Report, output: &Output, name: &str) -> anyhow::Result<()> {

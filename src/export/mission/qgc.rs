@@ -8,7 +8,7 @@ use crate::cost::Tolerance;
 use crate::export::chart::Chart;
 use crate::export::{Altitude, Delivery, ExportError, Firmware, Options, antimeridian, outline};
 use crate::geometry::geodesy::LatLon;
-use crate::geometry::{Point2, Point3, Segment};
+use crate::geometry::{Point3, Segment};
 use crate::threat::{Shape, Threat};
 
 /// MAVLink autopilots (`MAV_AUTOPILOT`).
@@ -127,7 +127,7 @@ fn fence(delivery: &Delivery, chart: &Chart, mission: &Mission) -> (Value, Vec<V
                 }));
             }
             Shape::Polygon(_) => {
-                polygons.extend(polygon_fences(&outline::ring(threat), chart));
+                polygons.extend(polygon_fences(&outline::ring_in_degrees(chart, threat)));
             }
         }
     }
@@ -137,11 +137,8 @@ fn fence(delivery: &Delivery, chart: &Chart, mission: &Mission) -> (Value, Vec<V
 
 /// A fence for each part of a ring between 180 degrees west and 180 degrees east: PX4 compares longitudes as numbers, and
 /// would take a ring with corners on either side for one round the rest of the earth.
-fn polygon_fences(ring: &[Point2], chart: &Chart) -> Vec<Value> {
-    let corners = ring.iter().map(|corner| {
-        let LatLon { lat, lon } = chart.place(*corner);
-        vec![lon, lat]
-    });
+fn polygon_fences(ring: &[LatLon]) -> Vec<Value> {
+    let corners = ring.iter().map(|LatLon { lat, lon }| vec![*lon, *lat]);
     let parts = antimeridian::parts(&corners.collect::<Vec<_>>()).into_iter();
     let fence = |part: Vec<Position>| {
         let corners: Vec<_> = part.iter().map(|corner| [corner[1], corner[0]]).collect();
@@ -174,6 +171,7 @@ fn is_passed_at_another_height(threat: &Threat, route: &[Point3], tolerance_m: f
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Point2;
     use crate::threat::Cylinder;
 
     #[test]

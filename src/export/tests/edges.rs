@@ -81,6 +81,51 @@ fn across_the_date_line_a_fence_holds() {
     check(-180.0, 1, -179.999);
 }
 
+/// On the plane the northern edge bows 40 m beyond its parallel, which is where it is straight in degrees.
+#[test]
+fn a_long_edge_is_fenced_and_drawn_where_a_route_is_kept_clear_of_it() {
+    let corner = |lat: f64, lon: f64| json!({"lat": lat, "lon": lon});
+    let document = json!({
+        "frame": "wgs84",
+        "start": {"lat": 47.02, "lon": 8.2, "alt": 30},
+        "target": {"lat": 47.02, "lon": 8.4, "alt": 30},
+        "threats": [{"kind": "polygon", "vertices": [
+            corner(47.0, 8.0), corner(47.0, 8.6), corner(46.9, 8.6), corner(46.9, 8.0)]}],
+        "altitude": {"min": 10, "max": 100},
+        "planner": {"smoothing": {"degree": 1, "spacing": 700}},
+    });
+    let scenario = accepted(&document);
+    let crate::threat::Shape::Polygon(polygon) = &scenario.threats[0].shape else {
+        panic!("{document}");
+    };
+    let middle = nalgebra::center(&polygon.vertices()[0], &polygon.vertices()[1]);
+    let beside = |north: f64| {
+        let LatLon { lat, lon } = scenario
+            .frame
+            .wgs84()
+            .expect("degrees")
+            .place(middle + Vector2::new(0.0, north));
+        [lat, lon]
+    };
+    let plan = plan(&document, &[(47.02, 8.3, 40.0)]);
+    let read = |format: &str| -> Value {
+        let text = write(&plan, format, &[]).expect("a plan");
+        serde_json::from_str(&text).expect("JSON")
+    };
+    let fences = read("qgc");
+    let fence = corners(&fences["geoFence"]["polygons"][0]["polygon"]);
+    let map = read("geojson");
+    let threat = map["features"]
+        .as_array()
+        .and_then(|features| features.last());
+    let ring = corners(&threat.expect("a threat")["geometry"]["coordinates"][0]);
+    let ring: Vec<[f64; 2]> = ring.iter().map(|[lon, lat]| [*lat, *lon]).collect();
+    for outline in [fence, ring] {
+        assert!(is_fenced(&outline, beside(-0.2)));
+        assert!(!is_fenced(&outline, beside(0.2)));
+    }
+}
+
 #[test]
 fn along_the_date_line_a_line_is_whole() {
     let document = json!({

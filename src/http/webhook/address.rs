@@ -21,15 +21,15 @@ impl Target {
     /// The allowed addresses, for a refusal.
     pub(in crate::http) fn allowed(private: bool) -> &'static str {
         if private {
-            "an http or https address, without user or fragment, of at most 2000 characters"
+            "an http or https address in ASCII, without user or fragment, of at most 2000 characters"
         } else {
-            "an https address of a public host, without user or fragment, of at most 2000 characters"
+            "an https address of a public host in ASCII, without user or fragment, of at most 2000 characters"
         }
     }
 
     /// Read an address; plain `http` is accepted only where private receivers are allowed.
     pub(in crate::http) fn read(text: &str, private: bool) -> Option<Self> {
-        if text.len() > MAX_LENGTH || text.contains('#') {
+        if text.len() > MAX_LENGTH || text.contains('#') || !text.is_ascii() {
             return None;
         }
         let uri: Uri = text.parse().ok()?;
@@ -160,6 +160,8 @@ mod tests {
             ("https://hooks.example:65536/", false, false),
             ("https://user:word@hooks.example/", false, false),
             ("https://hooks.example/#a", false, false),
+            ("https://hooks.example/gr\u{fc}n", false, false),
+            ("https://hooks.example/gr%C3%BCn", true, true),
             ("ftp://hooks.example/", false, false),
             ("hooks.example", false, false),
             ("/plans", false, false),

@@ -64,7 +64,10 @@ pub(super) fn asked(
         return Err(refused("left out: this service sends no webhooks"));
     };
     let private = settings.allow_private;
-    if values.next().is_some() || Target::read(&text, private).is_none() {
+    if values.next().is_some() {
+        return Err(params::repeated(NOCTULE_WEBHOOK.as_str()));
+    }
+    if Target::read(&text, private).is_none() {
         return Err(refused(Target::allowed(private)));
     }
     Ok(Some(text))

@@ -173,14 +173,6 @@ fn what_a_feature_gets_wrong_is_listed() {
             "radius is \"wide\", must be a number",
         ),
         (
-            circle(json!({"radius": 5, "influence": 2})),
-            "influence is 2, must be >= the radius, 5",
-        ),
-        (
-            circle(json!({"radius": 5, "base": 9, "top": 9})),
-            "base is 9, must be < the top, 9",
-        ),
-        (
             circle(json!({"name": "hut"})),
             "a point that is not named start or target and has no radius",
         ),
@@ -285,6 +277,69 @@ fn a_file_without_ends_is_no_scenario() {
 
 /// As our own exports write a triangle round a pole.
 #[test]
+fn heights_of_polygons_and_those_that_are_null_are_told_or_forgotten() {
+    let mut features = ends();
+    let ring = |alt: Value| {
+        json!([
+            [8.5, 47.3, alt],
+            [8.51, 47.3, alt],
+            [8.51, 47.31, alt],
+            [8.5, 47.3, alt]
+        ])
+    };
+    let polygon = |alt: Value| json!({"type": "Polygon", "coordinates": [ring(alt)]});
+    features.push(feature(json!({"name": 12}), polygon(json!(300))));
+    features.push(feature(json!({"top": 500}), polygon(json!(300))));
+    features.push(feature(json!({}), polygon(json!(null))));
+    features.push(feature(
+        json!({"radius": 90}),
+        json!({"type": "Point", "coordinates": [8.5, 47.3, null]}),
+    ));
+    let found = geojson(&features.into()).expect("a scenario");
+    let threats = &found.scenario["threats"];
+    assert_eq!(threats.as_array().map(Vec::len), Some(4));
+    assert_eq!(threats[0]["name"], "12");
+    assert_eq!(
+        unused(&found),
+        [
+            "/features/2: the heights of a polygon: it is kept clear of at any height, unless its data have a base or a top"
+        ]
+    );
+}
+
+/// To leave a threat out would let a route through.
+#[test]
+fn a_threat_whose_heights_cannot_be_read_is_kept_clear_of_at_any() {
+    let mut features = ends();
+    let at = || json!({"type": "Point", "coordinates": [8.5, 47.3]});
+    features.push(feature(
+        json!({"radius": 90, "base": 20, "top": "300 m"}),
+        at(),
+    ));
+    features.push(feature(
+        json!({"radius": 90, "base": 20, "top": 20, "influence": 20}),
+        at(),
+    ));
+    let found = geojson(&features.into()).expect("a scenario");
+    let threats = found.scenario["threats"].as_array().expect("a list");
+    assert_eq!(threats.len(), 2);
+    for threat in threats {
+        assert_eq!(
+            (&threat["base"], &threat["top"], &threat["influence"]),
+            (&json!(null), &json!(null), &json!(90.0))
+        );
+    }
+    assert_eq!(
+        unused(&found),
+        [
+            "/features/2: top is \"300 m\", must be a number: it is kept clear of at any height",
+            "/features/3: base is 20, must be < the top, 20: it is kept clear of at any height",
+            "/features/3: influence is 20, must be >= 90: it has no soft zone",
+        ]
+    );
+}
+
+#[test]
 fn a_polygon_closed_over_a_pole_is_a_ring_round_it() {
     let mut features = ends();
     features.push(feature(
@@ -293,22 +348,47 @@ fn a_polygon_closed_over_a_pole_is_a_ring_round_it() {
             [[-180, 88], [-120, 88], [0, 89], [120, 88], [180, 88], [180, 90], [-180, 90], [-180, 88]]]}),
     ));
     let found = geojson(&features.into()).expect("a scenario");
-    let corner = |lat: f64, lon: f64| json!({"lat": lat, "lon": lon});
-    assert_eq!(
-        found.scenario["threats"][0]["vertices"],
-        json!([
-            corner(88.0, -120.0),
-            corner(89.0, 0.0),
-            corner(88.0, 120.0),
-            corner(88.0, 180.0)
-        ])
+    let vertices = found.scenario["threats"][0]["vertices"].as_array();
+    let corner =
+        |vertex: &Value| ["lon", "lat"].map(|name| vertex[name].as_f64().expect("a number"));
+    let ring: Vec<[f64; 2]> = vertices.expect("a polygon").iter().map(corner).collect();
+    // Its edges are straight in degrees, and have corners on their way: once round the pole, along the parallel too.
+    let given = [[-120.0, 88.0], [0.0, 89.0], [120.0, 88.0], [180.0, 88.0]];
+    let places = given.map(|corner| ring.iter().position(|there| *there == corner));
+    assert_eq!(places[0], Some(0));
+    assert!(
+        places.is_sorted() && places.iter().all(Option::is_some),
+        "{places:?}"
     );
+    let at_most = [[-120.0, 0.0], [0.0, 120.0], [120.0, 180.0], [180.0, 240.0]];
+    for (index, [lon, lat]) in ring.iter().enumerate() {
+        let edge = places
+            .iter()
+            .filter(|place| place.is_some_and(|place| place <= index))
+            .count()
+            - 1;
+        let lon = if edge == 3 && *lon < 0.0 {
+            lon + 360.0
+        } else {
+            *lon
+        };
+        assert!(
+            (at_most[edge][0]..=at_most[edge][1]).contains(&lon),
+            "{index}: {lon}"
+        );
+        let along = match edge {
+            0 => 88.0 + (lon + 120.0) / 120.0,
+            1 => 89.0 - lon / 120.0,
+            _ => 88.0,
+        };
+        assert!((lat - along).abs() < 1e-9, "{index}: {lat}");
+    }
     assert_eq!(unused(&found), [""; 0]);
 }
 
 #[test]
 fn what_is_said_of_many_shapes_is_short() {
-    let polygons = vec![json!([[[1, 1], [2, 1], [2, 2]]]); 1000];
+    let polygons = vec![json!([[[1, 1], [1.01, 1], [1.01, 1.01]]]); 1000];
     let check = |properties: Value, expected: &str| {
         let mut features = ends();
         let coordinates = polygons.clone();

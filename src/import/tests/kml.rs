@@ -56,6 +56,24 @@ fn placemarks_of_kml() {
     assert_eq!(found.assumed[0].pointer, "/target/alt");
 }
 
+#[test]
+fn comments_are_not_read() {
+    let file = KML
+        .replace("<name>radar</name>", "<name>radar<!-- a draft --></name>")
+        .replace("<value>150</value>", "<value>1<!-- 9 -->50</value>")
+        .replace(
+            ">20</SimpleData>",
+            "><!-- metres -->2<!-- 7 -->0</SimpleData>",
+        )
+        .replace(
+            "8.52,47.31 8.52,47.32",
+            "8.52,47.31 <!-- 8.6,47.4 --> 8.52,47.32",
+        );
+    assert_ne!(file, KML);
+    let read = |text: &str| convert(text.as_bytes(), Syntax::Xml).expect("a scenario");
+    assert_eq!(read(&file), read(KML));
+}
+
 /// Both halves have the placemark's name and margin; between two threats a route could pass.
 #[test]
 fn a_polygon_cut_at_180_degrees_is_one_again() {

@@ -290,6 +290,44 @@ fn speeds_of_a_plan() {
     );
 }
 
+#[test]
+fn the_last_of_several_speeds_counts_and_the_others_are_told() {
+    let speed = |speed: f64| json!({"type": "SimpleItem", "command": 178, "frame": 2, "params": [1, speed, -1, 0, 0, 0, 0]});
+    let plan = json!({
+        "fileType": "Plan",
+        "mission": {"items": [speed(12.0), speed(20.0), speed(20.0),
+            {"type": "SimpleItem", "command": 16, "frame": 0, "params": [0, 0, 0, null, 47.4, 8.6, 530]}]},
+    });
+    let found = convert(plan.to_string().as_bytes(), Syntax::Json).expect("a scenario");
+    assert_eq!(found.scenario["vehicle"]["cruise_speed"], 20.0);
+    assert_eq!(
+        unused(&found),
+        ["/mission/items/0: a speed that a later item changes, where a scenario has one"]
+    );
+}
+
+/// Programs that do not know it write so; a mission elsewhere does not begin in the Gulf of Guinea.
+#[test]
+fn a_home_at_no_degrees_is_none() {
+    let plan = json!({
+        "fileType": "Plan",
+        "mission": {"plannedHomePosition": [0, 0, 0], "items": [
+            {"type": "SimpleItem", "command": 22, "frame": 3, "params": [0, 0, 0, null, 47.3, 8.5, 30]},
+            {"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, null, 47.4, 8.6, 30]}]},
+    });
+    let found = convert(plan.to_string().as_bytes(), Syntax::Json).expect("a scenario");
+    assert_eq!(found.scenario["start"]["lat"], 47.3);
+    let assumed: Vec<_> = found
+        .assumed
+        .iter()
+        .map(|assumed| assumed.pointer.as_str())
+        .collect();
+    assert!(
+        assumed.contains(&"/start/alt") && assumed.contains(&"/target/alt"),
+        "{assumed:?}"
+    );
+}
+
 /// It may be any value, and all items may count from it.
 #[test]
 fn a_long_value_in_place_of_an_altitude_is_told_once_and_shortened() {

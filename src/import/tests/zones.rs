@@ -241,7 +241,7 @@ fn volumes_of_ed_269_are_read() {
             "upperLimit": 2000, "upperVerticalReference": "AMSL", "horizontalProjection": projection})
     };
     let disc = json!({"type": "Circle", "center": [8.5, 47.4], "radius": 750.5});
-    let ring = json!([[8.5, 47.35], [8.6, 47.35], [8.6, 47.4], [8.5, 47.35]]);
+    let ring = json!([[8.5, 47.35], [8.52, 47.35], [8.52, 47.36], [8.5, 47.35]]);
     let file = json!({"title": "zones", "features": [
         {"identifier": "A1", "name": "Airport", "restriction": "REQ_AUTHORISATION", "geometry": [
             volume(json!(0), "AGL", "M", disc.clone()),

@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::super::draft::Draft;
 use super::super::flight::Flight;
 use super::super::place::Place;
-use super::super::{Conversion, ImportError, Most, antimeridian};
+use super::super::{Conversion, ImportError, Most, antimeridian, edges};
 use super::{Height, Outline};
 
 /// Whether a document holds such zones: the geometry of a feature is a list.
@@ -98,6 +98,7 @@ pub(super) fn rings<'d>(
     let joined = antimeridian::joined(&outer).into_iter();
     joined
         .map(|(_, ring)| {
+            let ring = edges::divided(&ring);
             let places = ring.iter().map(|[lon, lat]| Place::new(*lon, *lat));
             Ok(Outline::Ring(places.collect::<Result<_, String>>()?))
         })

@@ -12,7 +12,7 @@ pub(super) mod openair;
 use super::draft::Draft;
 use super::facts::begin;
 use super::place::Place;
-use super::threat::{Shape, Threat};
+use super::threat::{Made, Shape, Threat};
 use crate::geometry::geodesy::{LatLon, TangentPlane};
 use crate::geometry::{ring, simple};
 
@@ -150,7 +150,7 @@ fn add(
 
 impl Zone {
     /// As a threat, and what had to be changed for it.
-    pub(super) fn threat(self) -> Result<(Threat, Widened), String> {
+    pub(super) fn threat(self) -> Result<(Made, Widened), String> {
         let (shape, is_hull) = match self.outline {
             Outline::Circle(center, radius) => (Shape::circle(center, radius)?, false),
             Outline::Ring(places) => polygon(&places)?,
@@ -163,8 +163,8 @@ impl Zone {
             levels: usize::from(heights.into_iter().any(is_level)),
             outlines: usize::from(is_hull),
         };
-        let [base, top] = heights.map(Height::metres);
-        Ok((Threat::new(self.name, shape, base, top)?, widened))
+        let heights = heights.map(Height::metres);
+        Ok((Threat::new(self.name, shape, Ok(heights)), widened))
     }
 }
 

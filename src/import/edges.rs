@@ -71,8 +71,9 @@ mod tests {
         let count = |ring: &[Corner]| divided(ring).len();
         // 30 m, and a degree along a meridian and along the equator.
         assert_eq!(count(&[[8.0, 47.0], [8.0004, 47.0], [8.0, 47.0003]]), 3);
-        assert_eq!(count(&[[8.0, 0.0], [9.0, 0.0], [8.0, 1.0]]), 3 + 31);
-        // 76 km at 47 degrees: parts of 2.4 km, which are 0.1 m off.
+        let equator = [[8.0, 0.0], [9.0, 0.0], [9.0, 0.01], [8.0, 0.01]];
+        assert_eq!(count(&equator), 4);
+        // 76 km at 47 degrees: parts of 4.7 km, which are half a metre off.
         let square = [
             [8.0, 47.0],
             [9.0, 47.0],
@@ -81,9 +82,12 @@ mod tests {
             [8.0, 47.0],
         ];
         let corners = divided(&square);
-        assert_eq!(corners.len(), 5 + 31 + 31);
+        assert_eq!(corners.len(), 5 + 15 + 15);
         let along = corners.iter().filter(|corner| corner[1] <= 47.0);
-        assert_eq!(along.count(), 2 + 31 + 1);
+        assert_eq!(along.count(), 2 + 15 + 1);
+        // No ring, and beyond the earth.
+        assert_eq!(count(&[[8.0, 47.0], [9.0, 47.0], [8.0, 47.0]]), 3);
+        assert_eq!(count(&[[8.0, 97.0], [9.0, 47.0], [8.0, 47.5]]), 3);
     }
 
     #[test]

@@ -21,9 +21,9 @@ impl Target {
     /// The allowed addresses, for a refusal.
     pub(in crate::http) fn allowed(private: bool) -> &'static str {
         if private {
-            "an http or https address in ASCII, without user or fragment, of at most 2000 characters"
+            "an http or https address, without user or fragment, of at most 2000 characters, all of ASCII"
         } else {
-            "an https address of a public host in ASCII, without user or fragment, of at most 2000 characters"
+            "an https address of a public host, without user or fragment, of at most 2000 characters, all of ASCII"
         }
     }
 

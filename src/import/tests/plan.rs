@@ -295,7 +295,7 @@ fn the_last_of_several_speeds_counts_and_the_others_are_told() {
     let speed = |speed: f64| json!({"type": "SimpleItem", "command": 178, "frame": 2, "params": [1, speed, -1, 0, 0, 0, 0]});
     let plan = json!({
         "fileType": "Plan",
-        "mission": {"items": [speed(12.0), speed(20.0), speed(20.0),
+        "mission": {"plannedHomePosition": [47.3, 8.5, 480], "items": [speed(12.0), speed(20.0), speed(20.0),
             {"type": "SimpleItem", "command": 16, "frame": 0, "params": [0, 0, 0, null, 47.4, 8.6, 530]}]},
     });
     let found = convert(plan.to_string().as_bytes(), Syntax::Json).expect("a scenario");

@@ -9,6 +9,10 @@ use crate::scenario::Quadrature;
 use crate::terrain::HeightRange;
 use crate::threat::Threat;
 
+/// What is proven where threats reach from one side of the area to the other, or all round an end.
+const NO_WAY: &str =
+    "; no route keeps clear of the threats: they leave no way from start to target within the area";
+
 /// The legs of `route`.
 pub(super) fn legs(route: &[Point3]) -> Vec<Leg> {
     let leg = |(leg, turn): (Segment, f64)| Leg {
@@ -55,6 +59,16 @@ pub(super) fn violations(model: &Model, route: &[Point3]) -> Vec<Violation> {
         found.push(describe(model, &breach));
     });
     found
+}
+
+/// Add to what is said of threats that no other route passes them either.
+pub(super) fn say_closed(violations: &mut [Violation]) {
+    let of_threats = violations
+        .iter_mut()
+        .filter(|violation| violation.kind == Constraint::Threat.name());
+    for violation in of_threats {
+        violation.message.push_str(NO_WAY);
+    }
 }
 
 fn describe(model: &Model, breach: &Breach) -> Violation {

@@ -145,6 +145,9 @@ fn search(model: &Model, log: &mut Log) -> StopReason {
 /// than `lower`.
 fn search_on(model: &Model, lower: f64, log: &mut Log) -> StopReason {
     let mut reason = StopReason::Iterations;
+    if is_hopeless(model, log) {
+        return reason;
+    }
     let goes_on =
         |reason| reason == StopReason::Iterations && why_stop(model.scenario, log.stop).is_none();
     if goes_on(reason) && backwards::is_worthwhile(model, lower, log) {
@@ -160,6 +163,12 @@ fn search_on(model: &Model, lower: f64, log: &mut Log) -> StopReason {
         reason = share_out::search(model, log);
     }
     reason
+}
+
+/// Whether the search has found no route because there is none: all ways are closed, whoever searches.
+fn is_hopeless(model: &Model, log: &Log) -> bool {
+    let is_over = || why_stop(model.scenario, log.stop).is_some();
+    !log.best.is_feasible() && seeding::is_closed(model.scenario, &is_over)
 }
 
 /// Whether all that helps may be tried: no route is given to begin with, and the plain algorithm is not asked for.
@@ -248,7 +257,7 @@ fn measured(
     let evaluations = convergence.last().map_or(0, |last| last.evaluations);
     let quadrature = model.scenario.planner.quadrature;
     let cost = model.figures(&route, quadrature);
-    let violations = certificate::violations(model, &route);
+    let mut violations = certificate::violations(model, &route);
     // What is no number breaks no limit that it is compared to.
     let feasible = violations.is_empty() && cost.total.is_finite();
     if let Some(last) = convergence.last_mut() {
@@ -257,6 +266,10 @@ fn measured(
         // From 0, since a sum of nothing is -0.
         let amounts = violations.iter().map(|violation| violation.amount);
         last.best_violation = amounts.fold(0.0, |sum, amount| sum + amount);
+    }
+    let is_searched = stop_reason == StopReason::Iterations;
+    if !feasible && is_searched && seeding::is_closed(model.scenario, &|| false) {
+        certificate::say_closed(&mut violations);
     }
     let path = feasible.then(|| smoothing::smooth(model, &route)).flatten();
     Outcome {

@@ -4,7 +4,9 @@
 use super::aside::aside;
 use super::finish::bring_back;
 use super::log::Log;
-use super::{ConvergencePoint, Incumbent, Observer, StopReason, search_on, starts, why_stop};
+use super::{
+    ConvergencePoint, Incumbent, Observer, StopReason, is_hopeless, search_on, starts, why_stop,
+};
 use crate::cost::Model;
 use crate::geometry::{Point3, Side};
 use crate::scenario::{Scenario, Seeding};
@@ -31,7 +33,7 @@ pub(super) fn searched(model: &Model, scene: &Scenario, log: &mut Log) -> (StopR
         bring_back(model, log.route.clone(), log);
     }
     let is_over = reason != StopReason::Iterations || why_stop(model.scenario, log.stop).is_some();
-    if is_over || log.best.is_feasible() {
+    if is_over || log.best.is_feasible() || is_hopeless(model, log) {
         return (reason, lower);
     }
     (beside_true_rings(model, lower, log), lower)

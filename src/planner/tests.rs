@@ -342,12 +342,13 @@ fn an_impossible_scenario_ends_with_its_violations() {
     scenario.threats[1] = wall_across();
     let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX));
     assert!(!outcome.feasible && outcome.path.is_none() && outcome.path_checks.is_none());
-    assert!(
-        outcome
-            .violations
-            .iter()
-            .any(|violation| violation.kind == "threat")
-    );
+    let of_threats = outcome.violations.iter();
+    let of_threats: Vec<_> = of_threats.filter(|one| one.kind == "threat").collect();
+    assert!(!of_threats.is_empty());
+    for violation in of_threats {
+        let message = &violation.message;
+        assert!(message.contains("they leave no way"), "{message}");
+    }
     assert_eq!(outcome.bound.gap, None);
     let last = outcome.convergence.last().expect("there is a curve");
     let amounts = outcome.violations.iter().map(|violation| violation.amount);
@@ -360,13 +361,20 @@ fn an_impossible_scenario_ends_with_its_violations() {
 #[test]
 fn the_curve_of_an_impossible_scenario_repeats_no_iteration_but_the_last() {
     let mut scenario = scenario();
-    scenario.threats = vec![wall_across()];
+    // There is a way round this one, and the vehicle cannot turn into it.
+    scenario.threats = vec![wall([-100.0, 900.0], [400.0, 450.0])];
+    scenario.vehicle.max_turn_deg = 2.0;
     scenario.planner.seeding = Seeding::Tangent;
     scenario.planner.polish = true;
     (scenario.planner.waypoints, scenario.planner.iterations) = (4, 8);
     let mut diary = Diary::default();
     let outcome = plan(&scenario, &mut diary, &Nobody);
     assert!(!outcome.feasible);
+    let mut messages = outcome
+        .violations
+        .iter()
+        .map(|violation| &violation.message);
+    assert!(!messages.any(|message| message.contains("no way")));
     let iterations = |points: &[ConvergencePoint]| -> Vec<usize> {
         points.iter().map(|point| point.iteration).collect()
     };
@@ -375,6 +383,25 @@ fn the_curve_of_an_impossible_scenario_repeats_no_iteration_but_the_last() {
     assert_eq!(iterations(&diary.points), expected);
     let last = outcome.convergence.last().expect("there is a curve");
     assert_eq!(last.evaluations, outcome.evaluations);
+}
+
+/// That there is no way shows after one search, and no other looks for it.
+#[test]
+fn where_there_is_no_way_the_search_is_not_repeated() {
+    let mut scenario = scenario();
+    scenario.planner.seeding = Seeding::Tangent;
+    scenario.planner.polish = true;
+    search_briefly(&mut scenario);
+    let mut searched = |threats: &[Threat], turn: f64| {
+        scenario.threats = threats.to_vec();
+        scenario.vehicle.max_turn_deg = turn;
+        let outcome = plan(&scenario, &mut Nobody, &Nobody);
+        assert!(!outcome.feasible);
+        outcome.evaluations
+    };
+    let closed = searched(&[wall_across()], 2.0);
+    let open = searched(&[wall([-100.0, 900.0], [400.0, 450.0])], 2.0);
+    assert!(2 * closed < open, "{closed} {open}");
 }
 
 #[test]

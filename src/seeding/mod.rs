@@ -11,7 +11,7 @@ mod simpler;
 mod steep;
 mod taut;
 
-pub use bound::{WaysSought, cheap_ways, cheapest_slip, lower_bound, lower_bound_until};
+pub use bound::{WaysSought, cheap_ways, cheapest_slip, is_closed, lower_bound, lower_bound_until};
 pub use obstacles::Obstacles;
 pub use outline::{Outline, OutlineShape};
 pub use simpler::simpler;

@@ -9,7 +9,7 @@ use noctule::planner::{self, Nobody};
 use noctule::scenario::Scenario;
 use noctule::scenario::json::{self, Rules};
 use noctule::scenario::limits::Limits;
-use noctule::seeding::{Obstacles, lower_bound, steep_ground, taut_strings};
+use noctule::seeding::{Obstacles, is_closed, lower_bound, steep_ground, taut_strings};
 use proptest::prelude::*;
 use serde_json::Value;
 
@@ -601,10 +601,12 @@ fn check(drawn: &Drawn) -> Result<(), TestCaseError> {
     };
     let model = Model::new(&scenario);
     let bound = lower_bound(&scenario);
+    let closed = is_closed(&scenario, &|| false);
     for way in ways(&model) {
         let mut route = resample(&way, drawn.waypoints);
         let (violation, cost) = cheapen(&model, &mut route, drawn.seed);
         if violation <= 0.0 {
+            prop_assert!(!closed, "there is a way: {route:?}");
             prop_assert!(
                 cost >= bound,
                 "{cost} is below the bound {bound}: {route:?}"
@@ -613,6 +615,7 @@ fn check(drawn: &Drawn) -> Result<(), TestCaseError> {
     }
     let planned = planner::plan(&scenario, &mut Nobody, &Nobody);
     if planned.feasible {
+        prop_assert!(!closed, "there is a way: {drawn:?}");
         let cost = planned.cost.total;
         prop_assert!(
             cost >= bound,

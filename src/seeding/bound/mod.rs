@@ -78,6 +78,20 @@ pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
     bound * (1.0 - ROUNDING)
 }
 
+/// Whether threats, and the border of the area, leave no way at all from the start to the target, seen from above: no
+/// route keeps every limit then. `false` where that is not known, as once `stop` asks for an end.
+#[must_use]
+pub fn is_closed(scenario: &Scenario, stop: &dyn Fn() -> bool) -> bool {
+    let prices = Prices::of(scenario);
+    if prices.fuel <= 0.0 {
+        return false;
+    }
+    let simpler = simpler(scenario, Side::Within);
+    let walls = widening::walls(simpler.as_ref().unwrap_or(scenario), &prices);
+    let bare = string::cores(&walls);
+    string::plain(&walls, &bare, &prices, stop).is_infinite()
+}
+
 /// A lower bound for routes that slip through a gap between threats that their soft zones would have them avoid;
 /// infinite where there is no such gap, fuel costs nothing, or the threats have too many corners to examine quickly.
 #[must_use]

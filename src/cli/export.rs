@@ -1,7 +1,8 @@
 //! `noctule export`: a result that was kept as JSON in another format.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use anyhow::bail;
 use clap::Args;
 use serde::Deserialize;
 
@@ -43,13 +44,23 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let [chosen] = chosen.as_slice() else {
         unreachable!("one file has one format");
     };
+    if [&arguments.result, &arguments.scenario]
+        .iter()
+        .all(|file| **file == Path::new("-"))
+    {
+        bail!("the result and the scenario cannot both be standard input");
+    }
     let result = files::read(&arguments.result)?;
     let scenario = files::read(&arguments.scenario)?;
     let rules = arguments.ground.rules(Limits::NONE)?;
     let (result, scenario) = match pair(&result, &scenario, &rules) {
         Ok(pair) => pair,
-        Err(refusal) => {
-            eprintln!("{}: {refusal}", arguments.result.display());
+        Err(Amiss::Result(why)) => {
+            eprintln!("{}: {why}", arguments.result.display());
+            return Ok(exit::BAD_INPUT);
+        }
+        Err(Amiss::Scenario(why)) => {
+            eprintln!("{}: {why}", arguments.scenario.display());
             return Ok(exit::BAD_INPUT);
         }
     };
@@ -82,17 +93,25 @@ pub(super) fn code(error: &ExportError) -> u8 {
     }
 }
 
+/// Which of the two documents cannot be used, and why.
+enum Amiss {
+    Result(String),
+    Scenario(String),
+}
+
 /// Both documents as text, the scenario as it was accepted.
-fn pair(result: &[u8], scenario: &[u8], rules: &Rules) -> Result<(String, String), String> {
-    let result = String::from_utf8(result.to_vec()).map_err(|error| error.to_string())?;
-    let origin: Origin =
-        serde_json::from_str(&result).map_err(|error| format!("no result document: {error}"))?;
+fn pair(result: &[u8], scenario: &[u8], rules: &Rules) -> Result<(String, String), Amiss> {
+    let result =
+        String::from_utf8(result.to_vec()).map_err(|error| Amiss::Result(error.to_string()))?;
+    let origin: Origin = serde_json::from_str(&result)
+        .map_err(|error| Amiss::Result(format!("no result document: {error}")))?;
     // A scenario without a seed was planned with the one in the result.
     let scenario = json::read(scenario, rules, origin.seed)
-        .map_err(|refusal| format!("its scenario is refused: {refusal}"))?;
+        .map_err(|refusal| Amiss::Scenario(format!("the scenario is refused: {refusal}")))?;
     let accepted = json::write(&scenario);
     if sha256_hex(accepted.as_bytes()) == origin.scenario_sha256 {
         return Ok((result, accepted));
     }
-    Err("the scenario is not the one that it was planned for".to_owned())
+    let why = "the scenario is not the one that the result was planned for";
+    Err(Amiss::Scenario(why.to_owned()))
 }

@@ -24,7 +24,7 @@ pub(super) enum Command {
     Sample {
         #[command(flatten)]
         file: File,
-        /// File with one point a line, latitude and longitude in degrees, or - for standard input
+        /// File with one point a line, latitude and longitude in degrees, or - for standard input; empty lines are left out
         #[arg(long, value_name = "FILE")]
         points: PathBuf,
     },
@@ -33,19 +33,24 @@ pub(super) enum Command {
 #[derive(Args)]
 pub(super) struct File {
     /// The file
-    file: PathBuf,
+    #[arg(value_name = "FILE")]
+    path: PathBuf,
     /// Its coordinate reference system, if the file names none
     #[arg(long, value_name = "EPSG:CODE")]
     crs: Option<String>,
+    /// Its own name, if it was given another: an SRTM tile says where it lies by its name alone
+    #[arg(long = "filename", value_name = "NAME")]
+    own_name: Option<String>,
 }
 
 impl File {
     fn open(&self) -> anyhow::Result<Dataset> {
         let declared = Declared {
             crs: self.crs.as_deref(),
+            name: self.own_name.as_deref(),
             ..Declared::default()
         };
-        dem::open(&self.file, declared).with_context(|| self.file.display().to_string())
+        dem::open(&self.path, declared).with_context(|| self.path.display().to_string())
     }
 }
 
@@ -109,9 +114,10 @@ fn name(sample_type: SampleType) -> &'static str {
 fn sample(dataset: &Dataset, points: &Path) -> anyhow::Result<String> {
     let text = String::from_utf8(files::read(points)?)
         .with_context(|| format!("cannot read {}", points.display()))?;
-    let places = text
-        .lines()
-        .enumerate()
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    let lines = text.lines().enumerate();
+    let places = lines
+        .filter(|(_, line)| !line.trim().is_empty())
         .map(|(idx, line)| {
             place(line).with_context(|| {
                 format!(

@@ -16,7 +16,12 @@ pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
     let waypoints = (0..delivery.waypoints.len()).map(|index| waypoint(delivery, index));
     let threats = delivery.scenario.threats.iter().enumerate();
     let threats = threats.map(|(index, threat)| self::threat(delivery, index, threat));
-    let collection = FeatureCollection::new(path.chain(waypoints).chain(threats));
+    let mut collection = FeatureCollection::new(path.chain(waypoints).chain(threats));
+    // As GDAL names a layer, and our own importer a scenario.
+    collection.foreign_members = delivery.scenario.name.clone().map(|name| {
+        let member = ("name".to_owned(), Value::String(name));
+        JsonObject::from_iter([member])
+    });
     format!("{collection}\n")
 }
 

@@ -22,7 +22,7 @@ mod words;
 
 use delivery::Delivery;
 pub use error::{ExportError, OptionFault};
-pub use file_name::file_name;
+pub use file_name::{file_name, file_name_in_full};
 pub use options::{Altitude, Firmware, OPTIONS, OptionRule, Options};
 
 use crate::scenario::json::Rules;

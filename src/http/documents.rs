@@ -3,14 +3,20 @@
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 
 use super::caller::Caller;
 use super::params::{self, Id, NoParams, Params};
 use super::problem::Problem;
 use super::{AppState, accept, partial, retry};
-use crate::export::{self, ExportError, Format, OPTIONS, Options, ResultInput, file_name};
+use crate::export::{
+    self, ExportError, Format, OPTIONS, Options, ResultInput, file_name, file_name_in_full,
+};
 use crate::job::Plan;
 use crate::scenario::json::Unread;
+
+/// What is encoded in the second name of a file, RFC 8187.
+const ENCODED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.');
 
 /// Parameters of a result beside the options of its format.
 const PARAMETERS: [&str; 2] = ["format", "partial"];
@@ -132,10 +138,16 @@ fn write_first(
 
 /// How a browser should handle it.
 fn disposition(plan: &Plan, format: &Format) -> HeaderValue {
-    let name = file_name(plan.name.as_deref(), Some(&plan.id.to_string()), format);
+    let (scenario, id) = (plan.name.as_deref(), plan.id.to_string());
+    let name = file_name(scenario, Some(&id), format);
     let kind = if format.shown { "inline" } else { "attachment" };
-    HeaderValue::from_str(&format!("{kind}; filename=\"{name}\""))
-        .expect("a file's name is ASCII letters, digits and hyphens")
+    // RFC 6266: a browser that knows the second name takes that.
+    let in_full = file_name_in_full(scenario, Some(&id), format).map_or_else(String::new, |name| {
+        let encoded = utf8_percent_encode(&name, ENCODED);
+        format!("; filename*=UTF-8''{encoded}")
+    });
+    HeaderValue::from_str(&format!("{kind}; filename=\"{name}\"{in_full}"))
+        .expect("names are ASCII letters, digits, hyphens and percent signs")
 }
 
 /// At least one, the preferred first. Options unknown to the preferred format are refused; other formats that do not

@@ -258,6 +258,22 @@ fn a_dash_is_standard_output() {
 }
 
 #[test]
+fn points_may_have_empty_lines_and_a_tile_another_name() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let tile = directory.path().join("download.hgt");
+    fs::write(&tile, vec![0; 2 * 1201 * 1201]).expect("written");
+    let tile = tile.to_str().expect("UTF-8");
+    let points = "\u{feff}36.5 -84.5\n\n36.25,-84.75\r\n \n";
+    let sampled = |more: &[&str]| {
+        let arguments = ["terrain", "sample", tile, "--points", "-"];
+        run(&[&arguments[..], more].concat(), points)
+    };
+    let found = sampled(&["--filename", "N36W085.SRTMGL1.hgt"]);
+    assert_eq!(String::from_utf8_lossy(&found.stdout), "0\n0\n");
+    assert_eq!(sampled(&[]).status.code(), Some(1));
+}
+
+#[test]
 fn a_measurement_whose_report_could_not_be_kept_is_not_begun() {
     let file = tempfile::NamedTempFile::new().expect("a temporary file");
     let out = file.path().to_str().expect("UTF-8");

@@ -33,6 +33,24 @@ fn scenario() -> Value {
     })
 }
 
+/// Browsers of our time take the second name, others the first.
+#[tokio::test]
+async fn a_download_is_named_in_the_script_of_its_scenario() {
+    let api = Api::new();
+    let mut scenario = scenario();
+    scenario["name"] = "Übung 巡检".into();
+    let plan = ended(&api, &scenario, 47.4, 8.5450).await;
+    let tail = &plan[plan.len() - 8..];
+    let answer = api.get(&format!("{plan}/result?format=kml")).await;
+    assert_eq!(
+        answer.header("content-disposition"),
+        format!(
+            "attachment; filename=\"bung-{tail}.kml\"; \
+             filename*=UTF-8''%C3%BCbung-%E5%B7%A1%E6%A3%80-{tail}.kml"
+        )
+    );
+}
+
 /// Submits the scenario and ends its plan with a route through one place; the plan's address.
 async fn ended(api: &Api, scenario: &Value, lat: f64, lon: f64) -> String {
     let answer = api.post("/plans", scenario).await;
@@ -303,6 +321,9 @@ async fn exports_convert_back_to_scenarios() {
         }
         assert_eq!(scenario["threats"][0]["kind"], "cylinder", "{format}");
         assert_eq!(scenario["threats"][0]["radius"], 60.0);
+        if format == "geojson" {
+            assert_eq!(scenario["name"], self::scenario()["name"]);
+        }
         let accepted = api.post("/plans?validate_only=true", scenario).await;
         assert_eq!(accepted.status, 200, "{format}: {accepted:?}");
     }
@@ -575,9 +596,17 @@ fn the_command_line_plans_exports_and_converts() {
     fs::write(path("other.json"), other.to_string()).expect("written");
     let refused = export("other.json", &["--format", "wpl"]);
     assert_eq!(refused.status.code(), Some(2));
-    assert!(
-        String::from_utf8_lossy(&refused.stderr).contains("not the one that it was planned for")
+    assert_eq!(
+        String::from_utf8_lossy(&refused.stderr),
+        format!(
+            "{}: the scenario is not the one that the result was planned for\n",
+            path("other.json")
+        )
     );
+    let both = process::run(&["export", "-", "--scenario", "-"], "{}");
+    assert_eq!(both.status.code(), Some(1));
+    let told = String::from_utf8_lossy(&both.stderr);
+    assert!(told.contains("cannot both be standard input"), "{told}");
     let refused = export("flight.json", &["--format", "kml", "--set", "landing=true"]);
     assert_eq!(refused.status.code(), Some(1));
     assert!(

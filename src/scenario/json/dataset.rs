@@ -174,7 +174,7 @@ fn refuse(
 /// The names that exist, for a message.
 fn known(name: &str, names: &[String]) -> String {
     if names.is_empty() {
-        return "there are no datasets; PUT /terrains/{name} makes one, --terrain-dir names a directory of them"
+        return "there are no datasets; --terrain-dir names a directory of them, and PUT /terrains/{name} of a service makes one"
             .to_owned();
     }
     let names: Vec<&str> = names.iter().map(String::as_str).collect();

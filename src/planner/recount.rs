@@ -12,9 +12,16 @@ use super::log::Log;
 use super::{StopReason, is_from_scratch, newton, starts};
 use crate::cost::{Model, turns};
 use crate::geometry::Point3;
+use crate::scenario::Scenario;
+use crate::threat::Threat;
 
 /// The numbers of waypoints, as shares of the requested one.
 const SHARES: [f64; 2] = [0.8, 1.2];
+
+/// A number beside those, where threats may be passed above or below over level ground: with so few waypoints all ways are
+/// polished that lead elsewhere, and of those that pass one threat above and dive below the next, no start keeps the limits
+/// before it is.
+const FEW: usize = 5;
 
 /// Where more waypoints than this are requested, nothing is tried: it would take long.
 const MOST: usize = 64;
@@ -47,7 +54,7 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     // It takes as long again.
     log.tell();
     let waypoints = model.scenario.planner.waypoints;
-    for other in numbers(waypoints) {
+    for other in numbers(model.scenario) {
         let found = aside_with(model, other, starts::routes, log);
         let Some((reason, best, route)) = found else {
             continue;
@@ -70,23 +77,30 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     StopReason::Iterations
 }
 
-/// Other numbers of waypoints than `waypoints`, none of them 0.
+/// Other numbers of waypoints than those requested, none of them 0.
+fn numbers(scenario: &Scenario) -> impl Iterator<Item = usize> {
+    let waypoints = scenario.planner.waypoints;
+    let may_pass = |threat: &Threat| threat.base.is_some() || threat.top.is_some();
+    let few = scenario.terrain.is_flat() && scenario.threats.iter().any(may_pass);
+    let about = SHARES.map(|share| part(waypoints, share));
+    let few = Some(FEW).filter(|few_waypoints| few && *few_waypoints < about[0]);
+    about.into_iter().filter(|number| *number > 0).chain(few)
+}
+
+/// About this share of a number, and another number.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "about as many"
 )]
-fn numbers(waypoints: usize) -> impl Iterator<Item = usize> {
-    let shares = SHARES.into_iter().map(move |share| {
-        let part = waypoints as f64 * share;
-        let away = if share < 1.0 {
-            part.floor()
-        } else {
-            part.ceil()
-        };
-        away as usize
-    });
-    shares.filter(|number| *number > 0)
+fn part(waypoints: usize, share: f64) -> usize {
+    let part = waypoints as f64 * share;
+    let away = if share < 1.0 {
+        part.floor()
+    } else {
+        part.ceil()
+    };
+    away as usize
 }
 
 #[cfg(test)]
@@ -140,9 +154,18 @@ mod tests {
     fn numbers_of_waypoints_are_others() {
         let expected: [(usize, &[usize]); 4] =
             [(1, &[2]), (2, &[1, 3]), (10, &[8, 12]), (64, &[51, 77])];
+        let mut scenario = scenario();
         for (waypoints, expected) in expected {
-            assert_eq!(numbers(waypoints).collect::<Vec<_>>(), expected);
+            scenario.planner.waypoints = waypoints;
+            assert_eq!(numbers(&scenario).collect::<Vec<_>>(), expected);
         }
+        scenario.threats[0].top = Some(100.0);
+        for (waypoints, expected) in [(7, &[5, 9][..]), (8, &[6, 10, 5]), (10, &[8, 12, 5])] {
+            scenario.planner.waypoints = waypoints;
+            assert_eq!(numbers(&scenario).collect::<Vec<_>>(), expected);
+        }
+        scenario.terrain = peaks(0.0, &[]);
+        assert_eq!(numbers(&scenario).count(), 2);
     }
 
     /// With sixteen waypoints alone, the best found costs 792.6: it circles high above the mountain.

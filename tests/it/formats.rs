@@ -39,7 +39,7 @@ async fn a_download_is_named_in_the_script_of_its_scenario() {
     let api = Api::new();
     let mut scenario = scenario();
     scenario["name"] = "Übung 巡检".into();
-    let plan = ended(&api, &scenario, 47.4, 8.5450).await;
+    let plan = ended(&api, &scenario, 47.3985, 8.5510).await;
     let tail = &plan[plan.len() - 8..];
     let answer = api.get(&format!("{plan}/result?format=kml")).await;
     assert_eq!(

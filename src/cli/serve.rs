@@ -125,7 +125,15 @@ fn sweeper(parts: &Parts) -> Sweeper {
 /// `None` where webhooks are off, or other nodes send them.
 fn sender(config: &Config, parts: &Parts) -> Option<Sender> {
     let settings = parts.webhooks.clone().filter(|_| config.role.serves());
-    settings.map(|settings| Sender::start(parts.store.clone(), settings, parts.clock.clock()))
+    let instruments = parts.instruments.clone();
+    settings.map(|settings| {
+        Sender::start(
+            parts.store.clone(),
+            settings,
+            parts.clock.clock(),
+            instruments,
+        )
+    })
 }
 
 fn router(config: &Config, parts: Parts) -> Router {

@@ -36,13 +36,7 @@ pub(super) async fn convert(
 /// The flight that a map of zones is converted for, in the query.
 fn flight(uri: &Uri) -> Result<Flight, Problem> {
     let params = Params::read(uri, &["start", "target", "within"])?;
-    let end = |name: &str| {
-        let read = |text: &str| {
-            let end = text.parse::<End>();
-            end.map_err(|reason| params::refused(name, text, &reason))
-        };
-        params.text(name).map(read).transpose()
-    };
+    let end = |name| params.parse::<End>(name, End::ALLOWED);
     let flight = Flight {
         start: end("start")?,
         target: end("target")?,

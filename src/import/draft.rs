@@ -2,6 +2,7 @@
 
 use serde_json::json;
 
+use super::edges;
 use super::facts::{Facts, OF_A_THREAT, begin};
 use super::flight::Flight;
 use super::near::Near;
@@ -15,6 +16,9 @@ const MOST_UNUSED: usize = 1000;
 
 /// Why the heights of a polygon's corners are not used.
 pub(super) const HEIGHTS_OF_A_POLYGON: &str = "the heights of a polygon: it is kept clear of at any height, unless its data have a base or a top";
+
+/// Most corners of arcs and of long edges that are worked out: a short line of a file may stand for many of them.
+const MOST_WORKED_OUT: usize = 500_000;
 
 /// Usual altitude limit of unmanned aircraft, metres above ground.
 const CEILING_M: f64 = 120.0;
@@ -34,6 +38,8 @@ pub(super) struct Draft {
     /// Threats that lie elsewhere.
     n_elsewhere: usize,
     widened: Widened,
+    /// How many more corners of arcs and long edges may be worked out; 0 when there were more.
+    room: usize,
     /// Metres per second.
     pub(super) cruise_speed: Option<f64>,
     /// Elevation of the ground, metres, if the file gives it.
@@ -55,6 +61,7 @@ impl Draft {
             near: None,
             n_elsewhere: 0,
             widened: Widened::default(),
+            room: MOST_WORKED_OUT,
             cruise_speed: None,
             elevation: None,
             assumed: Vec::new(),
@@ -157,6 +164,17 @@ impl Draft {
         self.threat(at, facts, polygon(facts, ring));
     }
 
+    /// A ring whose edges are straight in degrees, with corners on the long ones.
+    pub(super) fn divided(&mut self, ring: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        edges::divided(ring, &mut self.room)
+    }
+
+    /// Whether there is room to work out so many corners; if not, the file is refused in the end.
+    pub(super) fn has_room(&mut self, corners: usize) -> bool {
+        self.room = self.room.saturating_sub(corners);
+        self.room > 0
+    }
+
     fn threat(&mut self, at: &str, facts: &Facts, made: Result<Made, String>) {
         match made {
             Ok(made) => {
@@ -243,6 +261,12 @@ impl Draft {
             );
             return Err(self.refused(detail));
         };
+        if self.room == 0 {
+            let detail = format!(
+                "the arcs and long edges of the file have over {MOST_WORKED_OUT} corners: leave out what lies far from the flight"
+            );
+            return Err(self.refused(detail));
+        }
         if let Some(excess) = self.threats.excess() {
             return Err(self.refused(excess));
         }

@@ -16,9 +16,9 @@ const RADIUS_M: f64 = 6.4e6;
 /// Degrees east and north.
 type Corner = [f64; 2];
 
-/// `ring`, closed or not, with more corners on its long edges. One that is no ring, or reaches beyond the earth, is as
-/// it was.
-pub(super) fn divided(ring: &[Corner]) -> Vec<Corner> {
+/// `ring`, closed or not, with more corners on its long edges, as long as there is `room` for them. One that is no ring,
+/// or reaches beyond the earth, is as it was.
+pub(super) fn divided(ring: &[Corner], room: &mut usize) -> Vec<Corner> {
     let is_on_earth = |[lon, lat]: &Corner| lon.abs() <= 180.0 && lat.abs() <= 90.0;
     let least = if ring.first() == ring.last() { 4 } else { 3 };
     if ring.len() < least || !ring.iter().all(is_on_earth) {
@@ -28,21 +28,27 @@ pub(super) fn divided(ring: &[Corner]) -> Vec<Corner> {
     let next = ring.iter().cycle().skip(1);
     for (from, to) in ring.iter().zip(next) {
         corners.push(*from);
-        divide(*from, *to, MOST_HALVINGS, &mut corners);
+        divide((*from, *to), MOST_HALVINGS, room, &mut corners);
     }
     corners
 }
 
 /// Add the corners between two others.
-fn divide(from: Corner, to: Corner, halvings: u32, corners: &mut Vec<Corner>) {
+fn divide(
+    (from, to): (Corner, Corner),
+    halvings: u32,
+    room: &mut usize,
+    corners: &mut Vec<Corner>,
+) {
     let east = wrapped(to[0] - from[0]);
     let middle = [wrapped(from[0] + east / 2.0), f64::midpoint(from[1], to[1])];
-    if halvings == 0 || is_straight(from, to, middle, east) {
+    if halvings == 0 || is_straight(from, to, middle, east) || *room == 0 {
         return;
     }
-    divide(from, middle, halvings - 1, corners);
+    *room -= 1;
+    divide((from, middle), halvings - 1, room, corners);
     corners.push(middle);
-    divide(middle, to, halvings - 1, corners);
+    divide((middle, to), halvings - 1, room, corners);
 }
 
 /// Whether the edge between two corners passes near enough by the `middle` of their degrees; they are `east` degrees apart.
@@ -68,7 +74,7 @@ mod tests {
 
     #[test]
     fn long_edges_along_a_parallel_get_corners_and_others_do_not() {
-        let count = |ring: &[Corner]| divided(ring).len();
+        let count = |ring: &[Corner]| divided(ring, &mut 1000).len();
         // 30 m, and a degree along a meridian and along the equator.
         assert_eq!(count(&[[8.0, 47.0], [8.0004, 47.0], [8.0, 47.0003]]), 3);
         let equator = [[8.0, 0.0], [9.0, 0.0], [9.0, 0.01], [8.0, 0.01]];
@@ -81,7 +87,7 @@ mod tests {
             [8.0, 48.0],
             [8.0, 47.0],
         ];
-        let corners = divided(&square);
+        let corners = divided(&square, &mut 1000);
         assert_eq!(corners.len(), 5 + 15 + 15);
         let along = corners.iter().filter(|corner| corner[1] <= 47.0);
         assert_eq!(along.count(), 2 + 15 + 1);
@@ -93,7 +99,7 @@ mod tests {
     #[test]
     fn what_is_left_of_each_edge_is_straight_enough() {
         let ring = [[179.5, -60.0], [-179.2, -60.4], [-179.9, -59.1]];
-        let corners = divided(&ring);
+        let corners = divided(&ring, &mut 1000);
         let next = corners.iter().cycle().skip(1);
         for (from, to) in corners.iter().zip(next) {
             let plane = TangentPlane::at(
@@ -123,6 +129,8 @@ mod tests {
         let ring: Vec<Corner> = (0..4)
             .map(|corner| [f64::from(corner) * 90.0 - 180.0, 89.9])
             .collect();
-        assert!(divided(&ring).len() <= 4 << MOST_HALVINGS);
+        assert!(divided(&ring, &mut 10_000).len() <= 4 << MOST_HALVINGS);
+        let mut room = 100;
+        assert_eq!((divided(&ring, &mut room).len(), room), (104, 0));
     }
 }

@@ -30,8 +30,7 @@ pub struct End {
 
 impl End {
     /// What may be written for one.
-    pub const ALLOWED: &str =
-        "latitude,longitude or latitude,longitude,altitude, in degrees and metres";
+    pub const ALLOWED: &str = "latitude,longitude or latitude,longitude,altitude, in degrees (-90 to 90, -180 to 180) and metres";
 }
 
 impl FromStr for End {
@@ -40,12 +39,15 @@ impl FromStr for End {
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers: Result<Vec<f64>, _> =
             text.split(',').map(|part| part.trim().parse()).collect();
-        let (lat, lon, alt) = match numbers.as_deref() {
-            Ok([lat, lon]) => (*lat, *lon, None),
-            Ok([lat, lon, alt]) if alt.is_finite() => (*lat, *lon, Some(*alt)),
-            _ => return Err(format!("must be {}", Self::ALLOWED)),
+        let read = match numbers.as_deref() {
+            Ok([lat, lon]) => Some((*lat, *lon, None)),
+            Ok([lat, lon, alt]) if alt.is_finite() => Some((*lat, *lon, Some(*alt))),
+            _ => None,
         };
-        let place = Place::new(lon, lat)?;
-        Ok(Self { place, alt })
+        let end = read.and_then(|(lat, lon, alt)| {
+            let place = Place::new(lon, lat).ok()?;
+            Some(Self { place, alt })
+        });
+        end.ok_or_else(|| format!("must be {}", Self::ALLOWED))
     }
 }

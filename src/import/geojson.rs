@@ -9,7 +9,7 @@ use super::facts::Facts;
 use super::flight::Flight;
 use super::place::Place;
 use super::zones::ed318;
-use super::{Conversion, ImportError, Most, antimeridian, edges};
+use super::{Conversion, ImportError, Most, antimeridian};
 
 /// Names that older GeoJSON uses for the only reference system of RFC 7946. The last ones mean the latitude first, but
 /// programs that write them put the longitude first all the same, as all GeoJSON does.
@@ -134,7 +134,8 @@ fn geometry(draft: &mut Draft, at: &str, within: &str, facts: &Facts, value: &Ge
             let rings_at = format!("{within}/coordinates");
             if let Some(ring) = outer(draft, facts, at, &rings_at, coordinates) {
                 for (_, ring) in antimeridian::joined(&[ring]) {
-                    draft.polygon(at, facts, &edges::divided(&ring));
+                    let ring = draft.divided(&ring);
+                    draft.polygon(at, facts, &ring);
                 }
             }
         }
@@ -178,7 +179,7 @@ fn polygons(draft: &mut Draft, within: &str, facts: &Facts, polygons: &[Vec<Vec<
         }
     }
     for (first, ring) in antimeridian::joined(&outer_rings) {
-        let ring = edges::divided(&ring);
+        let ring = draft.divided(&ring);
         draft.polygon(&place(indices[first]), facts, &ring);
     }
 }

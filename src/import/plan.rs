@@ -9,7 +9,7 @@ use super::draft::Draft;
 use super::facts::{Facts, begin, shown};
 use super::flight::Flight;
 use super::place::Place;
-use super::{Conversion, ImportError, Most, antimeridian, edges};
+use super::{Conversion, ImportError, Most, antimeridian};
 
 /// MAVLink commands (`MAV_CMD`) that have a position: waypoints and similar, then take-offs and landings.
 const WAYPOINTS: [u64; 6] = [16, 17, 18, 19, 31, 82];
@@ -349,7 +349,7 @@ fn polygons(draft: &mut Draft, fences: &[Value]) {
         }
     }
     for (first, ring) in antimeridian::joined(&rings) {
-        let ring = edges::divided(&ring);
+        let ring = draft.divided(&ring);
         draft.polygon(&place(indices[first]), &Facts::default(), &ring);
     }
 }

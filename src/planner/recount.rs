@@ -1,4 +1,4 @@
-//! The same search with a few waypoints fewer, and with a few more. Over hills where the limits of a vehicle that turns in
+//! The same search with a few waypoints fewer, with a few more, and with few. Over hills where the limits of a vehicle that turns in
 //! wide bows are felt or where the route circles, and over level ground where waypoints are scarce, they decide which ways
 //! are seen at all, and the best of those seen with another number may be better with this one too.
 
@@ -18,9 +18,8 @@ use crate::threat::Threat;
 /// The numbers of waypoints, as shares of the requested one.
 const SHARES: [f64; 2] = [0.8, 1.2];
 
-/// A number beside those, where threats may be passed above or below over level ground: with so few waypoints all ways are
-/// polished that lead elsewhere, and of those that pass one threat above and dive below the next, no start keeps the limits
-/// before it is.
+/// A number beside those over level ground, where threats may be passed above or below: with so few waypoints all ways that
+/// lead elsewhere are polished. One over a threat and under the next mostly breaks limits before it is.
 const FEW: usize = 5;
 
 /// Where more waypoints than this are requested, nothing is tried: it would take long.
@@ -79,11 +78,10 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
 
 /// Other numbers of waypoints than those requested, none of them 0.
 fn numbers(scenario: &Scenario) -> impl Iterator<Item = usize> {
-    let waypoints = scenario.planner.waypoints;
+    let about = SHARES.map(|share| part(scenario.planner.waypoints, share));
     let may_pass = |threat: &Threat| threat.base.is_some() || threat.top.is_some();
-    let few = scenario.terrain.is_flat() && scenario.threats.iter().any(may_pass);
-    let about = SHARES.map(|share| part(waypoints, share));
-    let few = Some(FEW).filter(|few_waypoints| few && *few_waypoints < about[0]);
+    let needs_few = scenario.terrain.is_flat() && scenario.threats.iter().any(may_pass);
+    let few = (needs_few && FEW < about[0]).then_some(FEW);
     about.into_iter().filter(|number| *number > 0).chain(few)
 }
 

@@ -8,7 +8,7 @@ mod otlp;
 pub mod spans;
 pub mod traceparent;
 
-pub use metrics::Metrics;
+pub use metrics::{Metrics, WebhookTry};
 pub use origins::{Origin, Origins};
 
 /// What the parts of the service report to.

@@ -465,7 +465,9 @@ async fn files_that_are_no_scenario_are_refused() {
     ] {
         let path = format!("/scenarios:convert?{query}");
         let answer = api.post(&path, &json!({})).await;
-        answer.expect_problem(400, "invalid-parameter");
+        let problem = answer.expect_problem(400, "invalid-parameter");
+        let detail = problem["detail"].as_str().expect("a text");
+        assert!(detail.matches("must be").count() <= 1, "{detail}");
     }
 }
 

@@ -199,6 +199,44 @@ fn namespaces_and_attributes_are_read_in_linear_time() {
     read(long("<kml>", |_| format!("<a{attributes}/>"), "</kml>"));
 }
 
+/// A short line may stand for many corners: there is an end to them.
+#[test]
+fn arcs_and_long_edges_are_worked_out_at_little_cost() {
+    let refused = |text: String| {
+        let syntax = Syntax::of(text.as_bytes());
+        let refused = at_little_cost(|| convert_for_a_flight(text.as_bytes(), syntax));
+        let Err(ImportError::NoScenario { detail, .. }) = refused else {
+            panic!("{refused:?}");
+        };
+        detail
+    };
+    let most = "the arcs and long edges of the file have over 500000 corners: leave out what lies far from the flight";
+    let head = "AC R\nAN a\nAL GND\nAH FL10\nV X=47:24:00 N 008:33:00 E\n";
+    let arcs = "DA 1,0,360\n".repeat(700_000);
+    assert_eq!(refused(format!("{head}{arcs}")), most);
+    let airspaces = format!("{head}DA 1,0,359\n").repeat(60_000);
+    assert_eq!(refused(airspaces), most);
+    let far = |n: usize| format!("[{},{}]", n % 7 * 25 - 80, n % 5 * 30 - 60);
+    let ring: Vec<String> = (0..500_000).map(far).collect();
+    let map = format!(
+        r#"{{"type":"Feature","properties":{{}},"geometry":{{"type":"Polygon","coordinates":[[{}]]}}}}"#,
+        ring.join(",")
+    );
+    assert_eq!(refused(map), most);
+    // A comb, whose teeth a sweep would look at together.
+    let tooth = |n: usize| {
+        format!(
+            "DP {}:00:00 N 008:{:02}:{:02} E\n",
+            46 + n % 2,
+            n / 60 % 60,
+            n % 60
+        )
+    };
+    let comb: String = (0..300_000).map(tooth).collect();
+    let detail = refused(format!("{head}{comb}"));
+    assert!(detail.contains("300000 vertices together"), "{detail}");
+}
+
 fn use_up(bytes: &[u8]) {
     let _ = at_little_cost(|| convert(bytes, Syntax::of(bytes)));
     let _ = at_little_cost(|| convert_for_a_flight(bytes, Syntax::of(bytes)));

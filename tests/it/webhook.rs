@@ -37,7 +37,12 @@ fn settings(allow_private: bool) -> Settings {
 }
 
 fn sender(api: &Api, allow_private: bool) -> Sender {
-    Sender::start(api.store.clone(), settings(allow_private), wall_clock())
+    Sender::start(
+        api.store.clone(),
+        settings(allow_private),
+        wall_clock(),
+        api.state.instruments.clone(),
+    )
 }
 
 /// A received message.
@@ -284,7 +289,12 @@ async fn a_webhook_whose_record_fails_is_not_sent_twice() {
     submit(&api, &receiver.url).await;
     run::complete(&*api.store, Vec::new()).await;
     let faulty = Arc::new(FaultyStore::new(api.store.clone()));
-    let _sender = Sender::start(faulty, settings(true), wall_clock());
+    let _sender = Sender::start(
+        faulty,
+        settings(true),
+        wall_clock(),
+        api.state.instruments.clone(),
+    );
     receiver.next().await;
     nothing_is_due(&api).await;
     assert!(receiver.messages.try_recv().is_err(), "it was told twice");
@@ -297,7 +307,12 @@ async fn a_webhook_whose_record_panics_is_sent_again() {
     let plan = accepted(&api, &receiver.url).await;
     run::complete(&*api.store, Vec::new()).await;
     let broken = Arc::new(FaultyStore::that_panics(api.store.clone()));
-    let _sender = Sender::start(broken, settings(true), wall_clock());
+    let _sender = Sender::start(
+        broken,
+        settings(true),
+        wall_clock(),
+        api.state.instruments.clone(),
+    );
     for _ in 0..2 {
         check(&receiver.next().await, &plan);
     }
@@ -326,6 +341,12 @@ async fn private_receivers_are_not_called() {
         due.len() == 2 && due.iter().all(|webhook| webhook.tries == 1)
     })
     .await;
+    let metrics = api.get("/metrics").await;
+    let metrics = String::from_utf8_lossy(&metrics.body);
+    for series in ["{outcome=\"failed\"} 2\n", "{outcome=\"given-up\"} 0\n"] {
+        let line = format!("noctule_webhook_tries_total{series}");
+        assert!(metrics.contains(&line), "{metrics}");
+    }
     assert!(receiver.messages.try_recv().is_err());
 }
 

@@ -15,6 +15,7 @@ use crate::http::status::StatusDocument;
 use crate::http::time::Time;
 use crate::job::PlanId;
 use crate::store::{Clock, Store, StoreError, Webhook};
+use crate::telemetry::{Instruments, WebhookTry};
 
 const WEBHOOK_ID: HeaderName = HeaderName::from_static("webhook-id");
 const WEBHOOK_TIMESTAMP: HeaderName = HeaderName::from_static("webhook-timestamp");
@@ -30,6 +31,7 @@ pub(super) struct Delivery {
     pub(super) client: Client,
     /// Decides when to try, and dates what is sent.
     pub(super) clock: Clock,
+    pub(super) instruments: Arc<Instruments>,
 }
 
 impl Delivery {
@@ -39,18 +41,19 @@ impl Delivery {
         // A panic counts as a try, or it would happen again at the next look.
         let trying = AssertUnwindSafe(self.try_once(webhook)).catch_unwind();
         let broke = |_| Err(std::io::Error::other("sending it broke"));
-        let pause_ms = match trying.await.unwrap_or_else(broke) {
+        let (tried, pause_ms) = match trying.await.unwrap_or_else(broke) {
             Ok(status) if status.is_success() => {
                 tracing::info!(plan_id = %id, tries, "the webhook got through");
-                None
+                (WebhookTry::Delivered, None)
             }
             Ok(StatusCode::GONE) => {
                 tracing::info!(plan_id = %id, tries, "the webhook's receiver is gone");
-                None
+                (WebhookTry::Gone, None)
             }
             Ok(status) => again(id, tries, &format!("the answer is {status}")),
             Err(error) => again(id, tries, &error.to_string()),
         };
+        self.instruments.metrics.webhook_tried(tried);
         let next_ms = pause_ms.map(|pause_ms| (self.clock)() + pause_ms);
         self.write_down(id, next_ms).await;
     }
@@ -94,16 +97,16 @@ impl Delivery {
     }
 }
 
-/// Milliseconds until the next try. The address stays out of the log: it may contain the receiver's own secret.
-fn again(id: PlanId, tries: u32, why: &str) -> Option<i64> {
+/// What came of a try, and the milliseconds until the next. The address stays out of the log: it may contain the receiver's own secret.
+fn again(id: PlanId, tries: u32, why: &str) -> (WebhookTry, Option<i64>) {
     let jitter = f64::from(getrandom::u32().unwrap_or(u32::MAX / 2)) / f64::from(u32::MAX);
     if let Some(pause_ms) = retry::pause_ms(tries, jitter) {
         let pause_s = pause_ms / 1000;
         tracing::warn!(plan_id = %id, tries, pause_s, why, "a webhook did not get through");
-        Some(pause_ms)
+        (WebhookTry::Failed, Some(pause_ms))
     } else {
         tracing::error!(plan_id = %id, tries, why, "a webhook did not get through and is given up");
-        None
+        (WebhookTry::GivenUp, None)
     }
 }
 
@@ -127,5 +130,18 @@ impl Message {
 
     fn to_json(&self) -> String {
         serde_json::to_string(self).expect("every map key is a string")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_try_is_given_up() {
+        let id = PlanId::nil();
+        let (tried, pause_ms) = again(id, 8, "no answer");
+        assert!(tried == WebhookTry::Failed && pause_ms > Some(0));
+        assert_eq!(again(id, 9, "no answer"), (WebhookTry::GivenUp, None));
     }
 }

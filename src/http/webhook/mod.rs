@@ -24,6 +24,7 @@ use super::params;
 use super::problem::Problem;
 use crate::job::{Owner, PlanId};
 use crate::store::{Clock, Store};
+use crate::telemetry::Instruments;
 use address::Target;
 use client::Client;
 use delivery::Delivery;
@@ -81,15 +82,21 @@ pub struct Sender {
 }
 
 impl Sender {
-    /// Send the webhooks in `store`.
+    /// Send the webhooks in `store`, and count the tries.
     #[must_use]
-    pub fn start(store: Arc<dyn Store>, settings: Settings, clock: Clock) -> Self {
+    pub fn start(
+        store: Arc<dyn Store>,
+        settings: Settings,
+        clock: Clock,
+        instruments: Arc<Instruments>,
+    ) -> Self {
         let client = Client::new(settings.allow_private);
         let delivery = Arc::new(Delivery {
             store,
             settings,
             client,
             clock,
+            instruments,
         });
         let end = watch::Sender::new(false);
         let sending = tokio::spawn(deliver_all(delivery, end.subscribe()));

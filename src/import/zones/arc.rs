@@ -53,9 +53,24 @@ impl Arc {
         self.turn > 0.0
     }
 
+    /// How many corners it has at most.
+    pub(super) fn count(&self) -> usize {
+        self.steps() + 2
+    }
+
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "no more than a whole circle has"
+    )]
+    fn steps(&self) -> usize {
+        (self.turn.abs() / TAU * STEPS).ceil() as usize
+    }
+
     /// Its ends, and corners between them: on it, or where `outside` as far outside as keeps all of it within.
     pub(super) fn corners(&self, outside: bool) -> Vec<Place> {
-        let steps = (self.turn.abs() / TAU * STEPS).ceil();
+        let steps = self.steps();
+        let share = |step: f64| step / steps as f64;
         let at = |share: f64, out: f64| {
             let [bearing, radius] = self.from;
             let (sin, cos) = libm::sincos(bearing + self.turn * share);
@@ -63,15 +78,14 @@ impl Arc {
             Place::from(self.plane.geodetic(Point2::new(radius * sin, radius * cos)))
         };
         let mut corners = vec![at(0.0, 1.0)];
-        let mut step = 0.0;
-        while step < steps {
+        let out = 1.0 / libm::cos(self.turn / steps as f64 / 2.0);
+        for step in 1..=steps {
+            let end = step as f64;
             if outside {
-                let half = self.turn / steps / 2.0;
-                corners.push(at((step + 0.5) / steps, 1.0 / libm::cos(half)));
+                corners.push(at(share(end - 0.5), out));
             }
-            step += 1.0;
-            if !outside || step >= steps {
-                corners.push(at(step / steps, 1.0));
+            if !outside || step == steps {
+                corners.push(at(share(end), 1.0));
             }
         }
         corners

@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::super::draft::Draft;
 use super::super::flight::Flight;
 use super::super::place::Place;
-use super::super::{Conversion, ImportError, Most, antimeridian, edges};
+use super::super::{Conversion, ImportError, Most, antimeridian};
 use super::{Height, Outline};
 
 /// Whether a document holds such zones: the geometry of a feature is a list.
@@ -53,7 +53,7 @@ fn zone(draft: &mut Draft, at: &str, feature: &Value) {
             let limit = volume[format!("{end}Limit")].as_f64();
             Height::measured(limit, unit, from.unwrap_or_default())
         };
-        let outlines = outlines(&volume["horizontalProjection"]);
+        let outlines = outlines(draft, &volume["horizontalProjection"]);
         super::add(draft, &at, name, outlines, [limit("lower"), limit("upper")]);
     }
 }
@@ -67,14 +67,14 @@ pub(super) fn is_open(restriction: &Value) -> bool {
 }
 
 /// A circle, or the outer rings of a polygon. Holes are a part of the zone here.
-fn outlines(projection: &Value) -> Result<Vec<Outline>, String> {
+fn outlines(draft: &mut Draft, projection: &Value) -> Result<Vec<Outline>, String> {
     match projection["type"].as_str() {
         Some("Circle") => {
             let radius = projection["radius"].as_f64();
             let radius = radius.ok_or("a circle whose radius is no number")?;
             Ok(vec![circle(&projection["center"], radius)?])
         }
-        Some("Polygon") => rings([&projection["coordinates"]]),
+        Some("Polygon") => rings(draft, [&projection["coordinates"]]),
         _ => Err("a horizontal projection that is neither a Circle nor a Polygon".to_owned()),
     }
 }
@@ -87,6 +87,7 @@ pub(super) fn circle(center: &Value, radius_m: f64) -> Result<Outline, String> {
 
 /// The outer rings of polygons, each given as a list of rings; those that were cut at the 180th meridian are joined.
 pub(super) fn rings<'d>(
+    draft: &mut Draft,
     polygons: impl IntoIterator<Item = &'d Value>,
 ) -> Result<Vec<Outline>, String> {
     let outer = polygons.into_iter().map(|polygon| {
@@ -98,7 +99,7 @@ pub(super) fn rings<'d>(
     let joined = antimeridian::joined(&outer).into_iter();
     joined
         .map(|(_, ring)| {
-            let ring = edges::divided(&ring);
+            let ring = draft.divided(&ring);
             let places = ring.iter().map(|[lon, lat]| Place::new(*lon, *lat));
             Ok(Outline::Ring(places.collect::<Result<_, String>>()?))
         })

@@ -60,8 +60,10 @@ fn geometry(draft: &mut Draft, at: &str, name: Option<&str>, value: &Value, dept
     let coordinates = &value["coordinates"];
     let outlines = match (value["type"].as_str(), value["extent"]["radius"].as_f64()) {
         (Some("Point"), Some(radius)) => ed269::circle(coordinates, radius).map(|one| vec![one]),
-        (Some("Polygon"), _) => ed269::rings([coordinates]),
-        (Some("MultiPolygon"), _) => ed269::rings(coordinates.as_array().into_iter().flatten()),
+        (Some("Polygon"), _) => ed269::rings(draft, [coordinates]),
+        (Some("MultiPolygon"), _) => {
+            ed269::rings(draft, coordinates.as_array().into_iter().flatten())
+        }
         _ => Err(
             "a zone that is neither a polygon nor a point with the radius of its extent".to_owned(),
         ),

@@ -22,6 +22,9 @@ const FOOT_M: f64 = 0.3048;
 /// Corners nearer to the one before, metres, are taken for the same: where an arc ends and a line goes on.
 const SAME_M: f64 = 0.1;
 
+/// An outline of more corners than this is not looked at: that it crosses itself is said when it is planned.
+const MOST_LOOKED_AT: usize = 5_000;
+
 /// A floor or a ceiling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Height {
@@ -183,7 +186,7 @@ fn polygon(places: &[Place]) -> Result<(Shape, bool), String> {
         corners.pop();
     }
     let (points, places): (Vec<_>, Vec<_>) = corners.into_iter().unzip();
-    if simple::check(&points).is_ok() {
+    if points.len() > MOST_LOOKED_AT || simple::check(&points).is_ok() {
         return Ok((Shape::polygon(places), false));
     }
     let hull = ring::distinct(simple::hull(&points));

@@ -85,7 +85,11 @@ fn add(draft: &mut Draft, at: &str, airspace: &Airspace) {
     if let Some(open) = open(airspace) {
         return draft.leave(at, open);
     }
-    let outlines = outline(&airspace.geom).map(|outline| vec![outline]);
+    let outlines = match outline(draft, &airspace.geom) {
+        Ok(outline) => Ok(vec![outline]),
+        Err(Unread::NoRoom) => return,
+        Err(Unread::Amiss(reason)) => Err(reason),
+    };
     let heights = [&airspace.lower_bound, &airspace.upper_bound].map(height);
     super::add(draft, &at, airspace.name.as_deref(), outlines, heights);
 }
@@ -138,7 +142,19 @@ fn metres(miles: f32) -> f64 {
     written * MILE_M
 }
 
-fn outline(geometry: &Geometry) -> Result<Outline, String> {
+/// Why an outline is not read.
+enum Unread {
+    NoRoom,
+    Amiss(String),
+}
+
+impl From<String> for Unread {
+    fn from(reason: String) -> Self {
+        Self::Amiss(reason)
+    }
+}
+
+fn outline(draft: &mut Draft, geometry: &Geometry) -> Result<Outline, Unread> {
     match geometry {
         Geometry::Circle {
             centerpoint,
@@ -146,7 +162,12 @@ fn outline(geometry: &Geometry) -> Result<Outline, String> {
         } => Ok(Outline::Circle(place(centerpoint)?, metres(*radius))),
         Geometry::Polygon { segments } => {
             let parts: Result<Vec<Part>, String> = segments.iter().map(Part::of).collect();
-            Ok(Outline::Ring(ring_of(&parts?)))
+            let parts = parts?;
+            let of_arcs = parts.iter().map(Part::worked_out);
+            if !draft.has_room(of_arcs.sum()) {
+                return Err(Unread::NoRoom);
+            }
+            Ok(Outline::Ring(ring_of(&parts)))
         }
     }
 }
@@ -183,6 +204,14 @@ impl Part {
                 ))
             }
         })
+    }
+
+    /// How many corners have to be worked out for it.
+    fn worked_out(&self) -> usize {
+        match self {
+            Self::Corner(_) => 0,
+            Self::Arc(arc) => arc.count(),
+        }
     }
 
     fn corners(&self, outside: bool) -> Vec<Place> {

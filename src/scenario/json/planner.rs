@@ -117,7 +117,15 @@ fn sizes(fields: &Fields<'_>, limits: &Limits, faults: &mut Faults) -> [Option<u
         MIN_POPULATION,
         limits.population,
     );
-    let iterations = size("iterations", DEFAULT_ITERATIONS, 1, limits.iterations);
+    // Nor do iterations that are left out ask for too much work.
+    let room = population
+        .zip(waypoints)
+        .map_or(u64::MAX, |(population, waypoints)| {
+            limits.work / work([population, 1, waypoints]).max(1)
+        });
+    let default =
+        usize::try_from(room).map_or(DEFAULT_ITERATIONS, |room| room.min(DEFAULT_ITERATIONS));
+    let iterations = size("iterations", default, 1, limits.iterations);
     [population, iterations, waypoints]
 }
 

@@ -25,6 +25,34 @@ const OTHER: &str = "OTHER";
 /// How copying a dataset can end.
 const FETCHES: [&str; 2] = ["fetched", "failed"];
 
+/// How a try to send a webhook can end: it is received, its receiver is gone for good, it will be tried again, or not any
+/// more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WebhookTry {
+    /// Answered with a 2xx.
+    Delivered,
+    /// Answered with 410.
+    Gone,
+    /// Not received yet.
+    Failed,
+    /// Not received, the last time.
+    GivenUp,
+}
+
+impl WebhookTry {
+    const ALL: [Self; 4] = [Self::Delivered, Self::Gone, Self::Failed, Self::GivenUp];
+
+    fn outcome(self) -> Outcome {
+        let outcome = match self {
+            Self::Delivered => "delivered",
+            Self::Gone => "gone",
+            Self::Failed => "failed",
+            Self::GivenUp => "given-up",
+        };
+        Outcome { outcome }
+    }
+}
+
 /// Counters and times of this process.
 #[derive(Debug)]
 pub struct Metrics {
@@ -51,8 +79,9 @@ pub struct Metrics {
     terrains: Level,
     terrain_sizes: Level,
     terrain_copies: Level,
-    terrain_fetches: Family<Fetch, Counter>,
+    terrain_fetches: Family<Outcome, Counter>,
     terrain_fetched: Counter,
+    webhook_tries: Family<Outcome, Counter>,
     lines_dropped: Counter,
 }
 
@@ -83,7 +112,7 @@ struct Operation {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct Fetch {
+struct Outcome {
     outcome: &'static str,
 }
 
@@ -208,10 +237,17 @@ impl Metrics {
         self.operation_faults.get_or_create(&operation).inc();
     }
 
+    /// A webhook was tried.
+    pub fn webhook_tried(&self, tried: WebhookTry) {
+        self.webhook_tries.get_or_create(&tried.outcome()).inc();
+    }
+
     /// A shared dataset was copied to this node, or `bytes` of it before that failed.
     pub fn terrain_fetched(&self, wholly: bool, bytes: u64) {
         let outcome = FETCHES[usize::from(!wholly)];
-        self.terrain_fetches.get_or_create(&Fetch { outcome }).inc();
+        self.terrain_fetches
+            .get_or_create(&Outcome { outcome })
+            .inc();
         self.terrain_fetched.inc_by(bytes);
     }
 

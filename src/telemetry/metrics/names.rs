@@ -6,7 +6,7 @@ use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::{Registry, Unit};
 
-use super::{FETCHES, Fetch, Metrics, Operation, Status};
+use super::{FETCHES, Metrics, Operation, Outcome, Status, WebhookTry};
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 struct Build {
@@ -98,6 +98,7 @@ impl Default for Metrics {
                 "Length of what was copied to this node",
                 Unit::Bytes,
             ),
+            webhook_tries: new.add("webhook_tries", "Tries to send a webhook, by outcome"),
             lines_dropped: new.add(
                 "log_lines_dropped",
                 "Log lines dropped because stderr was not read",
@@ -118,7 +119,10 @@ impl Metrics {
         let claim = Operation { operation: "claim" };
         drop(self.operation_faults.get_or_create(&claim));
         for outcome in FETCHES {
-            drop(self.terrain_fetches.get_or_create(&Fetch { outcome }));
+            drop(self.terrain_fetches.get_or_create(&Outcome { outcome }));
+        }
+        for tried in WebhookTry::ALL {
+            drop(self.webhook_tries.get_or_create(&tried.outcome()));
         }
         self
     }

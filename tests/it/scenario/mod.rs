@@ -174,6 +174,16 @@ fn a_default_is_never_beyond_a_limit() {
         (sizes.waypoints, sizes.population, sizes.iterations),
         (5, 50, 30)
     );
+    // Of the product of the three, iterations give way.
+    rules.limits = Limits {
+        work: 300_000,
+        ..Limits::default()
+    };
+    let scenario = json::read(LEAST.as_bytes(), &rules, 11).expect("no fault");
+    assert_eq!(scenario.planner.iterations, 150);
+    rules.limits.work = 1999;
+    let refused = json::read(LEAST.as_bytes(), &rules, 11).expect_err("too much");
+    assert!(refused.to_string().contains("limit work"), "{refused}");
 }
 
 /// A target that is steeper above the start than the vehicle climbs needs room for a detour, and so does the

@@ -7,7 +7,7 @@ use super::facts::{Facts, OF_A_THREAT, begin};
 use super::flight::Flight;
 use super::near::Near;
 use super::place::Place;
-use super::threat::{Made, Threats, circle, polygon};
+use super::threat::{Made, Shape, Threats, circle, polygon};
 use super::zones::{Widened, Zone};
 use super::{Assumed, Conversion, ImportError, Most, Unused};
 
@@ -18,7 +18,7 @@ const MOST_UNUSED: usize = 1000;
 pub(super) const HEIGHTS_OF_A_POLYGON: &str = "the heights of a polygon: it is kept clear of at any height, unless its data have a base or a top";
 
 /// Most corners of arcs and of long edges that are worked out: a short line of a file may stand for many of them.
-const MOST_WORKED_OUT: usize = 500_000;
+const MOST_WORKED_OUT: usize = 50_000;
 
 /// Usual altitude limit of unmanned aircraft, metres above ground.
 const CEILING_M: f64 = 120.0;
@@ -166,13 +166,31 @@ impl Draft {
 
     /// A ring whose edges are straight in degrees, with corners on the long ones.
     pub(super) fn divided(&mut self, ring: &[[f64; 2]]) -> Vec<[f64; 2]> {
-        edges::divided(ring, &mut self.room)
+        let places = ring.iter().map(|&[lon, lat]| Place { lat, lon });
+        let is_near = self
+            .near
+            .as_ref()
+            .is_none_or(|near| near.may_hold(places, 0.0));
+        if is_near {
+            edges::divided(ring, &mut self.room)
+        } else {
+            ring.to_vec()
+        }
     }
 
-    /// Whether there is room to work out so many corners; if not, the file is refused in the end.
-    pub(super) fn has_room(&mut self, corners: usize) -> bool {
+    /// Whether a zone is to be worked out that has so many corners, all within `reach`: it may be near, and there is room.
+    /// If there is not, the file is refused in the end.
+    pub(super) fn has_room(&mut self, corners: usize, reach: &Shape) -> bool {
+        if self.is_elsewhere(reach) {
+            self.n_elsewhere += 1;
+            return false;
+        }
         self.room = self.room.saturating_sub(corners);
         self.room > 0
+    }
+
+    fn is_elsewhere(&self, shape: &Shape) -> bool {
+        self.near.as_ref().is_some_and(|near| !near.meets(shape))
     }
 
     fn threat(&mut self, at: &str, facts: &Facts, made: Result<Made, String>) {
@@ -200,7 +218,7 @@ impl Draft {
 
     /// Keep a threat, unless it lies elsewhere.
     fn keep(&mut self, at: &str, (threat, amiss): Made) -> bool {
-        if self.near.as_ref().is_some_and(|near| !near.meets(&threat)) {
+        if self.is_elsewhere(&threat.shape) {
             self.n_elsewhere += 1;
             return false;
         }

@@ -42,7 +42,7 @@ fn divide(
 ) {
     let east = wrapped(to[0] - from[0]);
     let middle = [wrapped(from[0] + east / 2.0), f64::midpoint(from[1], to[1])];
-    if halvings == 0 || is_straight(from, to, middle, east) || *room == 0 {
+    if halvings == 0 || *room == 0 || is_straight(from, to, middle, east) {
         return;
     }
     *room -= 1;

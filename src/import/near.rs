@@ -7,18 +7,28 @@
 use serde_json::{Value, json};
 
 use super::place::Place;
-use super::threat::{Shape, Threat};
+use super::threat::Shape;
 use crate::geometry::geodesy::{LatLon, LatLonBox, TangentPlane, wrapped};
 use crate::geometry::{Point2, Rect};
 
 /// Least default distance beyond the box of both ends, metres.
 const LEAST_M: f64 = 1000.0;
 
-/// Farther away than this, metres, a place is beside no flight, and a plane would soon fold over.
+/// Farther away than this, metres, a shape of many degrees is beside no flight.
 const FARTHEST_M: f64 = 5e6;
 
-/// Threats count as near from so much farther off, as a share of the diagonal: the planner's plane is another one.
-const SLACK: f64 = 0.01;
+/// More degrees of longitude than this are many.
+const MANY: f64 = 60.0;
+
+/// Nearer to a pole than this latitude, everything is near: degrees of longitude tell nothing.
+const POLAR: f64 = 85.0;
+
+/// Metres of a degree of latitude, rounded down.
+const DEGREE_M: f64 = 110_500.0;
+
+/// Shapes count as near from so much farther off, as a share of the area: the planner keeps a flight within a
+/// rectangle of its plane.
+const SLACK: f64 = 0.02;
 
 /// Degrees are written to this share of one, outwards.
 const GRAIN: f64 = 1e6;
@@ -26,11 +36,9 @@ const GRAIN: f64 = 1e6;
 /// The surroundings of a flight.
 #[derive(Debug)]
 pub(super) struct Near {
-    plane: TangentPlane,
+    middle: LatLon,
     beyond_m: f64,
     area: LatLonBox,
-    /// The area on the plane, and a little more.
-    reach: Rect,
 }
 
 impl Near {
@@ -43,36 +51,55 @@ impl Near {
         let ends = [start, target].map(|end| plane.local(end));
         let beyond_m = within_m.unwrap_or_else(|| LEAST_M.max((ends[1] - ends[0]).norm() / 2.0));
         let flown = Rect::around(ends).expect("two points").grown(beyond_m);
-        let area = in_degrees(&plane, &flown);
-        let LatLonBox { min, max } = area;
-        let corner = |lat, lon| LatLon { lat, lon };
-        let [south_east, north_west] = [corner(min.lat, max.lon), corner(max.lat, min.lon)];
-        let sides = [corner(min.lat, middle.lon), corner(max.lat, middle.lon)];
-        let around = [min, max, south_east, north_west].into_iter().chain(sides);
-        let reach = Rect::around(around.map(|place| plane.local(place))).expect("six points");
         Self {
-            reach: reach.grown(SLACK * reach.diagonal()),
-            plane,
+            middle,
             beyond_m,
-            area,
+            area: in_degrees(&plane, &flown),
         }
     }
 
-    /// Whether a part of `threat`, or of its soft zone, may lie in the area.
-    pub(super) fn meets(&self, threat: &Threat) -> bool {
-        let (places, soft_m) = match &threat.shape {
+    /// Whether a part of `shape`, or of its soft zone, may lie in the area. Only degrees are compared, as shapes may be
+    /// many.
+    pub(super) fn meets(&self, shape: &Shape) -> bool {
+        match shape {
             Shape::Cylinder {
                 center, influence, ..
-            } => (std::slice::from_ref(center), *influence),
-            Shape::Polygon { vertices, margin } => (vertices.as_slice(), *margin),
-        };
-        let places = || places.iter().copied().map(LatLon::from);
-        let is_far = |place: LatLon| self.plane.origin().distance_m(place) > FARTHEST_M;
-        if places().all(is_far) {
-            return false;
+            } => self.may_hold([*center], *influence),
+            Shape::Polygon { vertices, margin } => self.may_hold(vertices.iter().copied(), *margin),
         }
-        let extent = Rect::around(places().map(|place| self.plane.local(place)));
-        extent.is_some_and(|extent| extent.grown(soft_m).meets(&self.reach))
+    }
+
+    /// Whether anything within `reach_m` of the ring of these places may lie in the area.
+    pub(super) fn may_hold(
+        &self,
+        places: impl IntoIterator<Item = Place> + Clone,
+        reach_m: f64,
+    ) -> bool {
+        let east = |lon: f64| wrapped(lon - self.middle.lon);
+        let at = |place: Place| Point2::new(east(place.lon), place.lat);
+        let Some(Rect { min, max }) = Rect::around(places.clone().into_iter().map(at)) else {
+            return false;
+        };
+        let farthest = min.y.abs().max(max.y.abs());
+        if farthest > POLAR || max.x - min.x > MANY {
+            let is_far = |place: Place| self.middle.distance_m(place.into()) > FARTHEST_M + reach_m;
+            return !places.into_iter().all(is_far);
+        }
+        // An edge that is straight on a plane leaves the box of its ends, northward or southward and to both sides.
+        let [wide, high] = [max.x - min.x, max.y - min.y].map(f64::to_radians);
+        let shrink = libm::cos(farthest.to_radians());
+        let bow = Point2::new(wide * high / shrink, wide * wide).map(f64::to_degrees);
+        let area = Rect {
+            min: Point2::new(east(self.area.min.lon), self.area.min.lat),
+            max: Point2::new(east(self.area.max.lon), self.area.max.lat),
+        };
+        let slack = SLACK * (area.max - area.min);
+        let reach = reach_m / DEGREE_M;
+        let more = Point2::new(reach / shrink + bow.x + slack.x, reach + bow.y + slack.y);
+        min.x - more.x <= area.max.x
+            && area.min.x <= max.x + more.x
+            && min.y - more.y <= area.max.y
+            && area.min.y <= max.y + more.y
     }
 
     /// How far the area reaches beyond both ends, metres.

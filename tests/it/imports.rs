@@ -210,13 +210,13 @@ fn arcs_and_long_edges_are_worked_out_at_little_cost() {
         };
         detail
     };
-    let most = "the arcs and long edges of the file have over 500000 corners: leave out what lies far from the flight";
+    let most = "the arcs and long edges of the file have over 50000 corners: leave out what lies far from the flight";
     let head = "AC R\nAN a\nAL GND\nAH FL10\nV X=47:24:00 N 008:33:00 E\n";
     let arcs = "DA 1,0,360\n".repeat(700_000);
     assert_eq!(refused(format!("{head}{arcs}")), most);
     let airspaces = format!("{head}DA 1,0,359\n").repeat(60_000);
     assert_eq!(refused(airspaces), most);
-    let far = |n: usize| format!("[{},{}]", n % 7 * 25 - 80, n % 5 * 30 - 60);
+    let far = |n: i64| format!("[{},{}]", n % 7 * 25 - 80, n % 5 * 30 - 60);
     let ring: Vec<String> = (0..500_000).map(far).collect();
     let map = format!(
         r#"{{"type":"Feature","properties":{{}},"geometry":{{"type":"Polygon","coordinates":[[{}]]}}}}"#,

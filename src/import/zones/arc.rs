@@ -53,6 +53,15 @@ impl Arc {
         self.turn > 0.0
     }
 
+    pub(super) fn center(&self) -> Place {
+        self.plane.origin().into()
+    }
+
+    /// How far from its centre it may lie, metres.
+    pub(super) fn reach_m(&self) -> f64 {
+        self.from[1].max(self.to_radius)
+    }
+
     /// How many corners it has at most.
     pub(super) fn count(&self) -> usize {
         self.steps() + 2

@@ -11,11 +11,12 @@ use openair::{
 use super::super::draft::Draft;
 use super::super::flight::Flight;
 use super::super::place::Place;
+use super::super::threat::Shape;
 use super::super::{Conversion, ImportError, Most, text};
 use super::arc::Arc;
 use super::{FOOT_M, Height, Outline};
-use crate::geometry::geodesy::{LatLon, TangentPlane};
-use crate::geometry::ring;
+use crate::geometry::geodesy::wrapped;
+use crate::geometry::{Point2, ring};
 
 /// Metres of a nautical mile, exactly.
 const MILE_M: f64 = 1852.0;
@@ -87,7 +88,7 @@ fn add(draft: &mut Draft, at: &str, airspace: &Airspace) {
     }
     let outlines = match outline(draft, &airspace.geom) {
         Ok(outline) => Ok(vec![outline]),
-        Err(Unread::NoRoom) => return,
+        Err(Unread::Elsewhere) => return,
         Err(Unread::Amiss(reason)) => Err(reason),
     };
     let heights = [&airspace.lower_bound, &airspace.upper_bound].map(height);
@@ -142,9 +143,9 @@ fn metres(miles: f32) -> f64 {
     written * MILE_M
 }
 
-/// Why an outline is not read.
+/// Why an outline is not read: it lies elsewhere, or there is no room for it, which the draft has noted; or it cannot be.
 enum Unread {
-    NoRoom,
+    Elsewhere,
     Amiss(String),
 }
 
@@ -164,8 +165,8 @@ fn outline(draft: &mut Draft, geometry: &Geometry) -> Result<Outline, Unread> {
             let parts: Result<Vec<Part>, String> = segments.iter().map(Part::of).collect();
             let parts = parts?;
             let of_arcs = parts.iter().map(Part::worked_out);
-            if !draft.has_room(of_arcs.sum()) {
-                return Err(Unread::NoRoom);
+            if !draft.has_room(of_arcs.sum(), &reach(&parts)) {
+                return Err(Unread::Elsewhere);
             }
             Ok(Outline::Ring(ring_of(&parts)))
         }
@@ -222,21 +223,42 @@ impl Part {
     }
 }
 
+/// What holds all parts: their corners and centres, and as much round these as the largest arc needs.
+fn reach(parts: &[Part]) -> Shape {
+    let place = |part: &Part| match part {
+        Part::Corner(corner) => *corner,
+        Part::Arc(arc) => arc.center(),
+    };
+    let reach_m = |part: &Part| match part {
+        Part::Corner(_) => 0.0,
+        Part::Arc(arc) => arc.reach_m(),
+    };
+    Shape::Polygon {
+        vertices: parts.iter().map(place).collect(),
+        margin: parts.iter().map(reach_m).fold(0.0, f64::max),
+    }
+}
+
 /// The corners of all parts. An arc bulges out where it turns the same way as the whole ring does.
 fn ring_of(parts: &[Part]) -> Vec<Place> {
-    let on_arcs: Vec<Place> = parts.iter().flat_map(|part| part.corners(false)).collect();
-    let Some(first) = on_arcs.first() else {
-        return on_arcs;
+    let on_arcs: Vec<Vec<Place>> = parts.iter().map(|part| part.corners(false)).collect();
+    let is_clockwise = is_clockwise(&on_arcs.concat());
+    let corners = parts.iter().zip(on_arcs).map(|(part, on_arc)| match part {
+        Part::Arc(arc) if arc.is_clockwise() == is_clockwise => arc.corners(true),
+        _ => on_arc,
+    });
+    corners.flatten().collect()
+}
+
+/// By its degrees, those of longitude as long as at its first corner.
+fn is_clockwise(ring: &[Place]) -> bool {
+    let Some(first) = ring.first() else {
+        return false;
     };
-    let plane = TangentPlane::at(LatLon::from(*first), 0.0);
-    let points: Vec<_> = on_arcs
-        .iter()
-        .map(|at| plane.local(LatLon::from(*at)))
-        .collect();
-    let is_clockwise = ring::twice_area(&points) < 0.0;
-    let bulges = |part: &Part| matches!(part, Part::Arc(arc) if arc.is_clockwise() == is_clockwise);
-    parts
-        .iter()
-        .flat_map(|part| part.corners(bulges(part)))
-        .collect()
+    let shrink = libm::cos(first.lat.to_radians());
+    let at = |place: &Place| {
+        let east = wrapped(place.lon - first.lon);
+        Point2::new(east * shrink, place.lat - first.lat)
+    };
+    ring::twice_area(&ring.iter().map(at).collect::<Vec<_>>()) < 0.0
 }

@@ -227,7 +227,7 @@ fn arcs_and_long_edges_are_worked_out_at_little_cost() {
     let tooth = |n: usize| {
         format!(
             "DP {}:00:00 N 008:{:02}:{:02} E\n",
-            46 + n % 2,
+            47 + n % 2,
             n / 60 % 60,
             n % 60
         )

@@ -137,3 +137,61 @@ fn in_degrees(plane: &TangentPlane, rect: &Rect) -> LatLonBox {
         },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// An edge is straight on the plane, or in degrees: neither may pass through the area of a flight whose shape was
+        /// left out.
+        #[test]
+        fn no_shape_is_left_out_that_an_edge_of_brings_into_the_area(
+            start in (-75.0..75.0, -180.0..180.0), way in (-0.5..0.5, -0.5..0.5),
+            aside in (-3.0..3.0, -3.0..3.0), corners in prop::collection::vec((-2.5..2.5, -2.5..2.5), 3..7),
+        ) {
+            let place = |(lat, lon): (f64, f64)| Place::new(wrapped(lon), lat).expect("on earth");
+            let off = |(lat, lon): (f64, f64), (north, east): (f64, f64)| (lat + north, lon + east);
+            let near = Near::of([place(start), place(off(start, way))], None);
+            let vertices: Vec<Place> = corners
+                .iter()
+                .map(|corner| place(off(off(start, aside), *corner)))
+                .collect();
+            let plane = TangentPlane::at(near.middle, 0.0);
+            let mut is_inside = false;
+            for (index, from) in vertices.iter().enumerate() {
+                let to = vertices[(index + 1) % vertices.len()];
+                let [a, b] = [*from, to].map(|end| plane.local(end.into()));
+                for step in 0..=60 {
+                    let share = f64::from(step) / 60.0;
+                    let straight = plane.geodetic(a + (b - a) * share);
+                    let degrees = LatLon {
+                        lat: from.lat + (to.lat - from.lat) * share,
+                        lon: wrapped(from.lon + wrapped(to.lon - from.lon) * share),
+                    };
+                    is_inside |= near.area.contains(straight) || near.area.contains(degrees);
+                }
+            }
+            let shape = Shape::polygon(vertices);
+            prop_assert!(!is_inside || near.meets(&shape));
+        }
+    }
+
+    #[test]
+    fn what_is_beyond_the_slack_is_elsewhere() {
+        let [start, target] =
+            [(8.0, 47.0), (8.1, 47.05)].map(|(lon, lat)| Place::new(lon, lat).expect("on earth"));
+        let near = Near::of([start, target], Some(2000.0));
+        let meets = |lon: f64, lat: f64, radius: f64| {
+            let center = Place::new(lon, lat).expect("on earth");
+            near.meets(&Shape::circle(center, radius).expect("a circle"))
+        };
+        assert!(meets(8.05, 47.02, 10.0));
+        assert!(meets(8.05, 47.2, 15_000.0));
+        assert!(!meets(8.05, 47.2, 10_000.0));
+        assert!(!meets(8.3, 47.02, 5000.0));
+        assert!(!meets(-171.95, -47.02, 5000.0));
+    }
+}

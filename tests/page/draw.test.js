@@ -64,7 +64,7 @@ test('a map of zones is laid over a scenario in degrees', async () => {
   await drawn(page, before.threats.length + 2);
   const after = await document_(page);
   assert.deepEqual({ ...after, area: before.area, threats: before.threats }, { area: undefined, ...before });
-  assert.deepEqual(after.threats.slice(before.threats.length).map(({ name, top }) => [name, top]), [['range', 9500 * 0.3048], ['plant', 9500 * 0.3048]]);
+  assert.deepEqual(after.threats.slice(before.threats.length).map(({ name, top }) => [name, top]), [['range', 2895.6], ['plant', 2895.6]]);
   assert.ok(after.area.min.lat < after.start.lat);
   const said = await page.textContent('#notice');
   assert.match(said, /2 threats were added\. Taken for granted: area \(\d+ m beyond start and target .* left out: 1\); threats \(1 of them without a base/);

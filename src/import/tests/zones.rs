@@ -54,18 +54,8 @@ fn airspaces_become_threats_between_their_floors_and_ceilings() {
             threat["top"].clone(),
         )
     };
-    assert_eq!(
-        kept(0),
-        (json!("FIRING RANGE"), json!(null), json!(3000.0 * 0.3048))
-    );
-    assert_eq!(
-        kept(1),
-        (
-            json!("TMA"),
-            json!(4500.0 * 0.3048),
-            json!(19500.0 * 0.3048)
-        )
-    );
+    assert_eq!(kept(0), (json!("FIRING RANGE"), json!(null), json!(914.4)));
+    assert_eq!(kept(1), (json!("TMA"), json!(1371.6), json!(5943.6)));
     assert_eq!(kept(2), (json!("PLANT"), json!(null), json!(null)));
     assert_eq!(read.scenario["threats"][0]["radius"], 1852.0);
     assert_eq!(read.scenario["altitude_datum"], "msl");
@@ -260,8 +250,8 @@ fn volumes_of_ed_269_are_read() {
         json!({"kind": "cylinder", "name": "Airport", "center": {"lat": 47.4, "lon": 8.5}, "radius": 750.5,
             "influence": 750.5, "base": null, "top": 2000.0})
     );
-    assert_eq!(threats[1]["base"], 1000.0 * 0.3048);
-    assert_eq!(threats[1]["top"], 2000.0 * 0.3048);
+    assert_eq!(threats[1]["base"], 304.8);
+    assert_eq!(threats[1]["top"], 609.6);
     assert_eq!(threats[1]["vertices"].as_array().map(Vec::len), Some(3));
     assert_eq!(threats[2]["name"], "A2");
     assert_eq!(threats[2]["base"], json!(null));

@@ -16,9 +16,6 @@ use super::threat::{Made, Shape, Threat};
 use crate::geometry::geodesy::{LatLon, TangentPlane};
 use crate::geometry::{ring, simple};
 
-/// Metres of a foot, exactly.
-const FOOT_M: f64 = 0.3048;
-
 /// Corners nearer to the one before, metres, are taken for the same: where an arc ends and a line goes on.
 const SAME_M: f64 = 0.1;
 
@@ -65,6 +62,11 @@ enum Outline {
     Ring(Vec<Place>),
 }
 
+/// Metres, a foot being 0.3048 of them; so written, 4500 feet are 1371.6 to the last digit.
+fn from_feet(feet: f64) -> f64 {
+    feet * 3048.0 / 10_000.0
+}
+
 impl Height {
     /// `None` where it does not limit a threat.
     fn metres(self) -> Option<f64> {
@@ -76,15 +78,13 @@ impl Height {
 
     /// By a number and the names of its unit and of what it is measured from, as EUROCAE's formats have them.
     fn measured(limit: Option<f64>, unit: &str, from: &str) -> Self {
-        let unit = match unit.to_ascii_uppercase().as_str() {
-            "M" => Some(1.0),
-            "FT" => Some(FOOT_M),
-            _ => None,
+        let Some(limit) = limit else {
+            return Self::Open;
         };
-        match (limit, unit, from) {
-            (None, _, _) => Self::Open,
-            (Some(limit), Some(unit), "AMSL") => Self::AboveSea(limit * unit),
-            (Some(limit), _, "AGL") if limit <= 0.0 => Self::Open,
+        match (from, unit.to_ascii_uppercase().as_str()) {
+            ("AMSL", "M") => Self::AboveSea(limit),
+            ("AMSL", "FT") => Self::AboveSea(from_feet(limit)),
+            ("AGL", _) if limit <= 0.0 => Self::Open,
             _ => Self::Unknown,
         }
     }

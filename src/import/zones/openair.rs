@@ -14,7 +14,7 @@ use super::super::place::Place;
 use super::super::threat::Shape;
 use super::super::{Conversion, ImportError, Most, text};
 use super::arc::Arc;
-use super::{FOOT_M, Height, Outline};
+use super::{Height, Outline, from_feet};
 use crate::geometry::geodesy::wrapped;
 use crate::geometry::{Point2, ring};
 
@@ -124,8 +124,8 @@ fn open(airspace: &Airspace) -> Option<&'static str> {
 fn height(altitude: &Altitude) -> Height {
     match altitude {
         Altitude::Gnd | Altitude::Unlimited | Altitude::FeetAgl(0) => Height::Open,
-        Altitude::FeetAmsl(feet) => Height::AboveSea(f64::from(*feet) * FOOT_M),
-        Altitude::FlightLevel(level) => Height::Level(f64::from(*level) * 100.0 * FOOT_M),
+        Altitude::FeetAmsl(feet) => Height::AboveSea(from_feet(f64::from(*feet))),
+        Altitude::FlightLevel(level) => Height::Level(from_feet(f64::from(*level) * 100.0)),
         Altitude::FeetAgl(_) | Altitude::Other(_) => Height::Unknown,
     }
 }

@@ -42,8 +42,11 @@ fn flight(uri: &Uri) -> Result<Flight, Problem> {
         target: end("target")?,
         within_m: params.within("within", &WITHIN_M, "a number of metres")?,
     };
-    if flight.within_m.is_some() && (flight.start.is_none() || flight.target.is_none()) {
-        return Err(params::missing("start", "given with target and within"));
+    let absent = [("start", flight.start), ("target", flight.target)]
+        .into_iter()
+        .find(|(_, end)| end.is_none());
+    match absent.filter(|_| flight.within_m.is_some()) {
+        Some((name, _)) => Err(params::missing(name, "given where within is")),
+        None => Ok(flight),
     }
-    Ok(flight)
 }

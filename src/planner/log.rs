@@ -21,6 +21,8 @@ pub(super) struct Log<'o> {
     pub(super) evaluations: u64,
     /// Whether something came after the last iteration, which its last point shows.
     pub(super) is_polished: bool,
+    /// Whether it is proven that there is no way, so that nothing else need be tried.
+    pub(super) is_closed: bool,
     /// Proven lower bound of a route's cost. Known only where the search makes use of it.
     pub(super) lower: Option<f64>,
 }
@@ -41,6 +43,7 @@ impl<'o> Log<'o> {
             reported: None,
             evaluations: 0,
             is_polished: false,
+            is_closed: false,
             lower: None,
         }
     }

@@ -112,7 +112,11 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
     // What follows the last iteration is cut short by a stop as well, and the outcome is another then.
     let cut_short = why_stop(scenario, stop).filter(|_| reason == StopReason::Iterations);
     let stop_reason = cut_short.unwrap_or(reason);
-    measured(&model, log.route, log.convergence, lower, stop_reason)
+    let mut outcome = measured(&model, log.route, log.convergence, lower, stop_reason);
+    if log.is_closed {
+        certificate::say_closed(&mut outcome.violations);
+    }
+    outcome
 }
 
 /// Search routes of `model`, and compute the bound of `scenario` meanwhile.
@@ -165,10 +169,11 @@ fn search_on(model: &Model, lower: f64, log: &mut Log) -> StopReason {
     reason
 }
 
-/// Whether the search has found no route because there is none: all ways are closed, whoever searches.
-fn is_hopeless(model: &Model, log: &Log) -> bool {
+/// Whether the search has found no route because there is none: all ways are closed, whoever searches. Notes it, too.
+fn is_hopeless(model: &Model, log: &mut Log) -> bool {
     let is_over = || why_stop(model.scenario, log.stop).is_some();
-    !log.best.is_feasible() && seeding::is_closed(model.scenario, &is_over)
+    log.is_closed = !log.best.is_feasible() && seeding::is_closed(model.scenario, &is_over);
+    log.is_closed
 }
 
 /// Whether all that helps may be tried: no route is given to begin with, and the plain algorithm is not asked for.
@@ -257,7 +262,7 @@ fn measured(
     let evaluations = convergence.last().map_or(0, |last| last.evaluations);
     let quadrature = model.scenario.planner.quadrature;
     let cost = model.figures(&route, quadrature);
-    let mut violations = certificate::violations(model, &route);
+    let violations = certificate::violations(model, &route);
     // What is no number breaks no limit that it is compared to.
     let feasible = violations.is_empty() && cost.total.is_finite();
     if let Some(last) = convergence.last_mut() {
@@ -266,10 +271,6 @@ fn measured(
         // From 0, since a sum of nothing is -0.
         let amounts = violations.iter().map(|violation| violation.amount);
         last.best_violation = amounts.fold(0.0, |sum, amount| sum + amount);
-    }
-    let is_searched = stop_reason == StopReason::Iterations;
-    if !feasible && is_searched && seeding::is_closed(model.scenario, &|| false) {
-        certificate::say_closed(&mut violations);
     }
     let path = feasible.then(|| smoothing::smooth(model, &route)).flatten();
     Outcome {

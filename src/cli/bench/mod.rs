@@ -87,16 +87,12 @@ pub(super) fn run(command: &Command) -> anyhow::Result<u8> {
                 serve::measure(arguments, cases)
             })
         }),
-        Command::Random(arguments) => arguments
-            .output
-            .make_ready()
-            .and_then(|()| random::measure(arguments))
-            .and_then(|report| write(&report, &arguments.output, "random")),
-        Command::Cluster(arguments) => arguments
-            .output
-            .make_ready()
-            .and_then(|()| cluster::measure(arguments))
-            .and_then(|report| write(&report, &arguments.output, "cluster")),
+        Command::Random(arguments) => {
+            kept(&arguments.output, "random", || random::measure(arguments))
+        }
+        Command::Cluster(arguments) => {
+            kept(&arguments.output, "cluster", || cluster::measure(arguments))
+        }
         Command::Price(arguments) => price::run(arguments),
     };
     let Err(error) = done else {
@@ -118,9 +114,19 @@ fn report(
     name: &str,
     measure: impl FnOnce(&[Case]) -> anyhow::Result<Report>,
 ) -> anyhow::Result<()> {
-    common.output.make_ready()?;
-    let report = measure(&case::cases(&common.scenario)?)?;
-    write(&report, &common.output, name)
+    kept(&common.output, name, || {
+        measure(&case::cases(&common.scenario)?)
+    })
+}
+
+/// Measure, and write the results where they are wanted, which is made ready before.
+fn kept(
+    output: &Output,
+    name: &str,
+    measure: impl FnOnce() -> anyhow::Result<Report>,
+) -> anyhow::Result<()> {
+    output.make_ready()?;
+    write(&measure()?, output, name)
 }
 
 impl Output {

@@ -164,7 +164,13 @@ impl<'a, 's> Blocks<'a, 's> {
         if owners.is_empty() {
             return;
         }
-        let pricer = &self.pricers.full;
+        // Where a violation is worth nothing, it is not worth knowing exactly.
+        let is_clear = |owner: &usize| rivals.is_some_and(|rivals| rivals[*owner].is_feasible());
+        let pricer = if owners.iter().all(is_clear) {
+            &self.pricers.verdicts
+        } else {
+            &self.pricers.full
+        };
         let price = if self.hilly {
             pricer.routes_at_best(points, ground, owners.len(), &mut self.proven)
         } else {

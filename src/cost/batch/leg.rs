@@ -116,6 +116,12 @@ impl<'a, S: Simd> Leg<'a, S> {
         }
     }
 
+    /// Where it is at `t`, seen from above.
+    #[inline(always)]
+    pub(super) fn at(&self, t: Lane<S>) -> [Lane<S>; 2] {
+        [self.a.x + self.dx * t, self.a.y + self.dy * t]
+    }
+
     /// `value` in every lane.
     #[inline(always)]
     pub(super) fn splat(&self, value: f64) -> Lane<S> {

@@ -111,7 +111,7 @@ impl Price {
 pub struct Pricer<'s> {
     model: Model<'s>,
     tolerance: Tolerance,
-    /// Whether it matters only that a leg leaves the band, not by how much.
+    /// Whether it matters only that a leg leaves the band or enters a polygon, not by how much.
     verdict: bool,
     quadrature: Quadrature,
     limits: Limits,
@@ -139,8 +139,9 @@ impl<'s> Pricer<'s> {
         }
     }
 
-    /// Skips measuring how far a leg leaves the band once it is seen to leave it: for a search that has no use for such
-    /// a leg. Whether there is a violation, and everything else, stays the same.
+    /// Skips measuring how far a leg leaves the band or enters a polygon once it is seen to do so: for a search that has
+    /// no use for such a leg. Whether there is a violation stays the same, and so does what a leg costs that enters no
+    /// polygon; for one that enters, exposure to that polygon may be missing.
     #[must_use]
     pub fn verdicts(mut self) -> Self {
         self.verdict = true;

@@ -13,6 +13,13 @@ use crate::geometry::{LEVEL, Point2, Rect, ring};
 use crate::scenario::Quadrature;
 use crate::threat::{HAIR, Polygon, Zone};
 
+/// So many corners are looked at for each of a block of legs to see which of them enter. The scalar code has an index
+/// for rings of more.
+const MOST_CORNERS: usize = 96;
+
+/// A leg this many tolerances deep in lanes is deeper than one whatever the rounding.
+const SURELY: f64 = 2.0;
+
 /// A ring between two heights.
 #[derive(Debug, Clone)]
 pub(super) struct Ring {
@@ -20,7 +27,7 @@ pub(super) struct Ring {
     extent: Rect,
     /// Box round the ring itself.
     bounds: Rect,
-    vertices: Vec<Point2>,
+    edges: Vec<(Point2, Point2)>,
     margin: f64,
     span: Span,
     /// `None` where every leg is left to the scalar code.
@@ -49,12 +56,11 @@ struct Linear<S: Simd> {
 
 impl Ring {
     pub(super) fn of(polygon: &Polygon, extent: Rect, span: Span) -> Self {
-        let vertices = polygon.vertices().to_vec();
         Self {
             extent,
             bounds: polygon.bounds(),
             zones: polygon.zones().map(<[Zone]>::to_vec),
-            vertices,
+            edges: ring::edges(polygon.vertices()).collect(),
             margin: polygon.margin(),
             span,
         }
@@ -62,9 +68,13 @@ impl Ring {
 
     /// The exposure of the legs that neither touch nor enter the ring.
     #[inline(always)]
-    fn settle<S: Simd>(&self, zones: &[Zone], leg: &Leg<S>, met: Mask<S>) -> Settled<S> {
-        let window = self.span.window(leg);
-        let met = met & window.some;
+    fn settle<S: Simd>(
+        &self,
+        zones: &[Zone],
+        leg: &Leg<S>,
+        window: &Window<S>,
+        met: Mask<S>,
+    ) -> Settled<S> {
         let mut exposure = leg.splat(0.0);
         let mut left = met & !(leg.moves & window.t0.lt(window.t1));
         // As in the scalar code, which treats an edge as slightly longer.
@@ -78,45 +88,99 @@ impl Ring {
                 continue;
             }
             let view = View::of(leg, zone);
-            left = left | (near & view.may_meet(leg, zone, touch));
+            left = left | (near & view.may_meet(leg, window, zone, touch));
             if zone.is_shared {
-                left = left | (near & view.may_meet(leg, zone, touch + self.margin));
+                left = left | (near & view.may_meet(leg, window, zone, touch + self.margin));
             } else if self.margin > 0.0 {
-                exposure = exposure + near.keep(view.edge(leg, &window, zone, self.margin));
+                exposure = exposure + near.keep(view.edge(leg, window, zone, self.margin));
             }
             if self.margin > 0.0 && zone.before.is_some() {
-                exposure = exposure + view.corner(leg, &window, zone, self.margin, met);
+                exposure = exposure + view.corner(leg, window, zone, self.margin, met);
             }
         }
-        let inside = met & !left & self.in_bounds(leg);
+        let start = leg.at(window.t0);
+        let inside = met & !left & self.in_bounds(start);
         if inside.any() {
-            left = left | (inside & self.contains_start(leg));
+            left = left | (inside & self.contains(start));
         }
         Settled { exposure, left }
     }
 
     #[inline(always)]
-    fn in_bounds<S: Simd>(&self, leg: &Leg<S>) -> Mask<S> {
-        let (x, y) = (leg.a.x, leg.a.y);
-        leg.splat(self.bounds.min.x).le(x)
-            & x.le(leg.splat(self.bounds.max.x))
-            & leg.splat(self.bounds.min.y).le(y)
-            & y.le(leg.splat(self.bounds.max.y))
+    fn in_bounds<S: Simd>(&self, [x, y]: [Lane<S>; 2]) -> Mask<S> {
+        x.with(self.bounds.min.x).le(x)
+            & x.le(x.with(self.bounds.max.x))
+            & y.with(self.bounds.min.y).le(y)
+            & y.le(y.with(self.bounds.max.y))
     }
 
-    /// Where legs begin inside, by the even-odd rule.
+    /// Where a point is inside, by the even-odd rule.
     #[inline(always)]
-    fn contains_start<S: Simd>(&self, leg: &Leg<S>) -> Mask<S> {
-        let (x, y, zero) = (leg.a.x, leg.a.y, leg.splat(0.0));
+    fn contains<S: Simd>(&self, [x, y]: [Lane<S>; 2]) -> Mask<S> {
+        let zero = x.with(0.0);
         let mut inside = x.lt(x);
-        for (a, b) in ring::edges(&self.vertices) {
-            let (over_a, over_b) = (y.lt(leg.splat(a.y)), y.lt(leg.splat(b.y)));
+        for &(a, b) in &self.edges {
+            let (over_a, over_b) = (y.lt(y.with(a.y)), y.lt(y.with(b.y)));
             let spans = (over_a & !over_b) | (over_b & !over_a);
             let crossing = (y - a.y) * ((b.x - a.x) / (b.y - a.y)) + a.x;
             let crossed = spans & zero.lt(crossing - x);
             inside = (inside & !crossed) | (crossed & !inside);
         }
         inside
+    }
+
+    /// A depth that each of the `wanted` legs reaches for certain, metres; 0 where none is seen. Where a leg enters, the
+    /// middle of its first part within is mostly deep.
+    #[inline(always)]
+    fn depth_seen<S: Simd>(&self, leg: &Leg<S>, window: &Window<S>, wanted: Mask<S>) -> Lane<S> {
+        let (mut first, mut second) = (window.t1, window.t1);
+        for &(a, b) in &self.edges {
+            let (along, to_a) = (b - a, [-(leg.a.x - a.x), -(leg.a.y - a.y)]);
+            // Where the leg's line crosses that of the edge, as shares of both, times `across`.
+            let across = leg.dx * along.y - leg.dy * along.x;
+            let of_leg = to_a[0] * along.y - to_a[1] * along.x;
+            let of_edge = to_a[0] * leg.dy - to_a[1] * leg.dx;
+            let t = of_leg / across;
+            let crosses = (of_edge * (of_edge - across)).le(leg.splat(0.0))
+                & window.t0.lt(t)
+                & t.lt(window.t1);
+            let t = crosses.select(t, window.t1);
+            second = second.min(first.max(t));
+            first = first.min(t);
+        }
+        let before = self.depth_between(leg, [window.t0, first], wanted);
+        before.max(self.depth_between(leg, [first, second], wanted))
+    }
+
+    /// How deep a leg is in the ring halfway between two shares of it; 0 outside, and where it is not `wanted`.
+    #[inline(always)]
+    fn depth_between<S: Simd>(
+        &self,
+        leg: &Leg<S>,
+        [from, to]: [Lane<S>; 2],
+        wanted: Mask<S>,
+    ) -> Lane<S> {
+        let middle = leg.at((from + to) * 0.5);
+        let inside = wanted & self.in_bounds(middle);
+        if !inside.any() {
+            return leg.splat(0.0);
+        }
+        (inside & self.contains(middle)).keep(self.distance(middle))
+    }
+
+    /// The distance of a point from the ring.
+    #[inline(always)]
+    fn distance<S: Simd>(&self, [x, y]: [Lane<S>; 2]) -> Lane<S> {
+        let (zero, one) = (x.with(0.0), x.with(1.0));
+        let mut least = x.with(f64::INFINITY);
+        for &(a, b) in &self.edges {
+            let (along, from) = (b - a, [x - a.x, y - a.y]);
+            let foot = (from[0] * along.x + from[1] * along.y) * (1.0 / along.norm_squared());
+            let foot = foot.clamp(zero, one);
+            let off = [from[0] - foot * along.x, from[1] - foot * along.y];
+            least = least.min(off[0] * off[0] + off[1] * off[1]);
+        }
+        least.sqrt()
     }
 }
 
@@ -129,14 +193,14 @@ impl<S: Simd> View<S> {
         }
     }
 
-    /// Where a leg may come within `reach` of the part of the edge.
+    /// Where the part `window` of a leg may come within `reach` of the part of the edge.
     #[inline(always)]
-    fn may_meet(&self, leg: &Leg<S>, zone: &Zone, reach: Lane<S>) -> Mask<S> {
+    fn may_meet(&self, leg: &Leg<S>, window: &Window<S>, zone: &Zone, reach: Lane<S>) -> Mask<S> {
         // Seen from the leg, the ends of the part.
         let off = self.along.at_start * self.outward.gain - self.outward.at_start * self.along.gain;
         let end_off = off - self.outward.gain * zone.length;
         let aside = reach * leg.level;
-        let [along, outward] = [self.along.ends(), self.outward.ends()];
+        let [along, outward] = [self.along.ends(window), self.outward.ends(window)];
         !(outward[1].lt(-reach)
             | reach.lt(outward[0])
             | along[1].lt(-reach)
@@ -214,11 +278,11 @@ impl<S: Simd> Linear<S> {
         self.at_start + self.gain * t
     }
 
-    /// The lesser and the greater of the values at the ends of the leg.
+    /// The lesser and the greater of the values at the ends of the window.
     #[inline(always)]
-    fn ends(&self) -> [Lane<S>; 2] {
-        let at_end = self.at_start + self.gain;
-        [self.at_start.min(at_end), self.at_start.max(at_end)]
+    fn ends(&self, window: &Window<S>) -> [Lane<S>; 2] {
+        let (from, to) = (self.at(window.t0), self.at(window.t1));
+        [from.min(to), from.max(to)]
     }
 
     /// Between which `t` of the leg it is above 0, a hair above where it stays the same; none where the first is not the
@@ -256,13 +320,21 @@ impl Pricer<'_> {
         if !met.any() {
             return;
         }
+        let window = ring.span.window(leg);
         if let (Some(zones), Quadrature::Integral) = (&ring.zones, self.quadrature) {
-            let settled = ring.settle(zones, leg, met);
+            met = met & window.some;
+            let settled = ring.settle(zones, leg, &window, met);
             *exposure = *exposure + (met & !settled.left).keep(settled.exposure);
             met = settled.left;
             if !met.any() {
                 return;
             }
+        }
+        if self.verdict && met.any() && ring.edges.len() <= MOST_CORNERS {
+            let seen = ring.depth_seen(leg, &window, met & window.some);
+            let entered = seen.with(SURELY * self.tolerance.length_m).lt(seen);
+            *violation = *violation + entered.keep(seen);
+            met = met & !entered;
         }
         let threat = &self.model.scenario.threats[threat_idx];
         let mut depths = leg.splat(0.0);

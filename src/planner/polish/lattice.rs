@@ -127,7 +127,7 @@ impl<'m, 's> Lattice<'m, 's> {
     /// Choose the best way where the route keeps every limit; the best way then keeps them too. Above hills legs are
     /// priced as if they kept their heights, and measured until all those of the best way are proven to.
     fn find_clear(&mut self, last: usize) -> bool {
-        self.price_legs(last, self.hilly);
+        self.price_legs(last, true);
         self.clear.set(&self.legs);
         self.measured.clear();
         let mut measured = [[false; CHOICES]; CHOICES];
@@ -195,8 +195,9 @@ impl<'m, 's> Lattice<'m, 's> {
     }
 
     /// Price every leg between places of neighbours: those of the route itself last, the others in
-    /// rows that lead to the eight new places of one waypoint, or come from them.
-    fn price_legs(&mut self, last: usize, at_best: bool) {
+    /// rows that lead to the eight new places of one waypoint, or come from them. For a `clear` way, legs that break a
+    /// limit are worth nothing, and above hills all are priced as if they kept their heights.
+    fn price_legs(&mut self, last: usize, clear: bool) {
         self.from.clear();
         self.to.clear();
         for leg_idx in 0..last {
@@ -220,11 +221,11 @@ impl<'m, 's> Lattice<'m, 's> {
         }
         self.prices.clear();
         self.prices.resize(self.from.len(), Price::ZERO);
-        if at_best {
-            self.pricer
-                .legs_at_best(&self.from, &self.to, &mut self.prices);
-        } else {
-            self.pricer.legs(&self.from, &self.to, &mut self.prices);
+        let (from, to) = (&self.from, &self.to);
+        match (clear, self.hilly) {
+            (false, _) => self.pricer.legs(from, to, &mut self.prices),
+            (true, false) => self.verdicts.legs(from, to, &mut self.prices),
+            (true, true) => self.verdicts.legs_at_best(from, to, &mut self.prices),
         }
         // Those of the sweep before are written over: nobody reads what they keep of it.
         self.legs.resize_with(last, || Leg::EMPTY);

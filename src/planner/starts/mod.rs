@@ -51,6 +51,9 @@ use shapes::Shapes;
 /// Routes to start from at most.
 const STARTS: usize = 16;
 
+/// To leave the surplus of so many points out takes a while.
+const LONG: usize = 64;
+
 /// Steps by which a start is pulled into place.
 const ROUGH_STEPS: Steps = Steps {
     from: 0.03,
@@ -143,7 +146,8 @@ fn with_as_many(
     let is_scene_vast = is_vast(model.scenario);
     for shape in shapes {
         // The first will do where looking at another takes time that is not there.
-        if is_scene_vast && !priced.is_empty() && is_over() {
+        let takes_long = is_scene_vast || shape.len() > LONG;
+        if takes_long && !priced.is_empty() && is_over() {
             break;
         }
         let route = with_waypoints(model, shape, waypoints);

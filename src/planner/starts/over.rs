@@ -2,13 +2,20 @@
 
 use super::steepest;
 use crate::cost::Model;
-use crate::geometry::{Point2, Point3, Segment};
+use crate::geometry::{Point2, Point3, Rect, Segment};
 use crate::planner::price::price;
 use crate::scenario::Scenario;
 use crate::threat::Threat;
 
 /// A leg at the height of a base touches it; metres below, it does not.
 pub(super) const TOUCH: f64 = 1e-3;
+
+/// Waypoints are added to a route while it has less than this many times those that may be flown, and [`LEAST_ROOM`]: of
+/// more of them none is kept.
+const ROOM: usize = 2;
+
+/// See [`ROOM`].
+const LEAST_ROOM: usize = 64;
 
 /// Whether the altitude band reaches above the top of `threat`, or below its base, somewhere over it.
 pub(super) fn passable(scenario: &Scenario, threat: &Threat) -> bool {
@@ -38,14 +45,27 @@ fn heights(scenario: &Scenario, threat: &Threat) -> (f64, f64) {
 }
 
 /// `route` with additional waypoints, and others moved up or down, where legs run through threats that can be passed
-/// above or below.
-pub(super) fn lifted_over(model: &Model, mut route: Vec<Point3>) -> Vec<Point3> {
+/// above or below; once `is_over`, only past those threats that were looked at.
+pub(super) fn lifted_over(
+    model: &Model,
+    mut route: Vec<Point3>,
+    is_over: &dyn Fn() -> bool,
+) -> Vec<Point3> {
     let scenario = model.scenario;
     let threats = scenario.threats.iter();
     for threat in threats.filter(|threat| passable(scenario, threat)) {
+        if is_over() {
+            break;
+        }
+        let extent = threat.extent();
         let mut leg = 0;
         while leg + 1 < route.len() {
-            leg += 1 + pass(model, threat, &mut route, leg);
+            let is_near = Rect::around([route[leg].xy(), route[leg + 1].xy()])
+                .is_some_and(|bounds| bounds.meets(&extent));
+            leg += 1;
+            if is_near {
+                leg += pass(model, threat, &mut route, leg - 1);
+            }
         }
     }
     route
@@ -76,10 +96,8 @@ fn pass(model: &Model, threat: &Threat, route: &mut Vec<Point3>, first: usize) -
     };
     // Where a waypoint lies within the threat, it is moved itself.
     let moved = [from <= 0.0, to >= 1.0];
-    let [one, both] = level.ways(&leg, (from, to));
-    let ways = [(moved, one), (moved, both), ([true; 2], Vec::new())];
     let before = route.len();
-    let past = ways.map(|(moved, way)| {
+    let past = |moved: [bool; 2], way: Vec<Point3>| {
         let mut past = route.clone();
         let ends = [first, first + 1].into_iter().zip(moved);
         for (idx, _) in ends.filter(|(idx, moved)| *moved && *idx > 0 && idx + 1 < before) {
@@ -89,13 +107,42 @@ fn pass(model: &Model, threat: &Threat, route: &mut Vec<Point3>, first: usize) -
         past.extend(way.into_iter().chain(onward));
         let next = first + 1 + past.len() - before;
         level.reach(model.scenario, &mut past, first, next);
-        (price(model, &past), past)
-    });
-    let best = past
-        .into_iter()
-        .min_by(|(one, _), (other, _)| one.rank(other));
-    *route = best.expect("there are three ways").1;
+        past
+    };
+    let by_its_ends = past([true; 2], Vec::new());
+    let room = LEAST_ROOM.max(ROOM * model.scenario.planner.waypoints);
+    *route = if before < room {
+        let [one, both] = level.ways(&leg, (from, to)).map(|way| past(moved, way));
+        cheapest(model, route, [one, both, by_its_ends])
+    } else {
+        by_its_ends
+    };
     route.len() - before
+}
+
+/// The cheapest of `ways`, each of which is `route` but for a part.
+fn cheapest(model: &Model, route: &[Point3], ways: [Vec<Point3>; 3]) -> Vec<Point3> {
+    // Of all, the same waypoints before and after are left out, but for one on either side.
+    let (mut before, mut after) = (route.len() - 1, route.len() - 1);
+    for way in &ways {
+        before = before.min(alike(route.iter(), way.iter()));
+        after = after.min(alike(route.iter().rev(), way.iter().rev()));
+    }
+    let after = after.min(route.len() - before);
+    let part = |way: &Vec<Point3>| price(model, &way[before - 1..way.len() + 1 - after]);
+    let ranked = ways.into_iter().map(|way| (part(&way), way));
+    let best = ranked.min_by(|(one, _), (other, _)| one.rank(other));
+    best.expect("there are three").1
+}
+
+/// How many points are the same before the first that is not.
+fn alike<'r>(
+    one: impl Iterator<Item = &'r Point3>,
+    other: impl Iterator<Item = &'r Point3>,
+) -> usize {
+    one.zip(other)
+        .take_while(|(one, other)| one == other)
+        .count()
 }
 
 /// The height at which a threat is passed.
@@ -199,7 +246,11 @@ mod tests {
     }
 
     fn straight_over(scenario: &Scenario) -> Vec<Point3> {
-        lifted_over(&Model::new(scenario), vec![scenario.start, scenario.target])
+        lifted_over(
+            &Model::new(scenario),
+            vec![scenario.start, scenario.target],
+            &|| false,
+        )
     }
 
     fn keeps_limits(scenario: &Scenario, route: &[Point3]) -> bool {
@@ -249,7 +300,7 @@ mod tests {
         scenario.threats.push(next);
         let corners = [[300.0, 490.0], [700.0, 480.0]].map(|[x, y]| Point3::new(x, y, 80.0));
         let route = [scenario.start, corners[0], corners[1], scenario.target].to_vec();
-        let route = lifted_over(&Model::new(&scenario), route);
+        let route = lifted_over(&Model::new(&scenario), route, &|| false);
         assert!(keeps_limits(&scenario, &route), "{route:?}");
         assert_eq!(route.len(), 4);
         assert!(
@@ -265,7 +316,7 @@ mod tests {
         scenario.vehicle.max_climb_deg = 20.0;
         let at = |x: f64| Point3::new(x, 500.0, 80.0);
         let route = [100.0, 420.0, 500.0, 580.0, 900.0].map(at).to_vec();
-        let route = lifted_over(&Model::new(&scenario), route);
+        let route = lifted_over(&Model::new(&scenario), route, &|| false);
         assert!(keeps_limits(&scenario, &route), "{route:?}");
         let high = |x: f64| route.iter().find(|at| at.x >= x).expect("on the way").z;
         assert!((high(500.0) - 120.0).abs() < 1e-9);
@@ -281,6 +332,25 @@ mod tests {
         closed.top = Some(151.0);
         scenario.threats = vec![closed];
         assert_eq!(straight_over(&scenario), straight);
+    }
+
+    /// Only so many waypoints are added as a route may have, or it takes for ever; the rest is passed by those.
+    #[test]
+    fn a_row_of_many_low_threats_is_passed_by_few_waypoints() {
+        let mut scenario = with_a_low(disc([0.0; 4]));
+        scenario.threats = (0..2_000)
+            .map(|idx| {
+                let mut low = disc([110.0 + 0.39 * f64::from(idx), 500.0, 0.1, 0.1]);
+                low.top = Some(120.0);
+                low
+            })
+            .collect();
+        let route = straight_over(&scenario);
+        let most = LEAST_ROOM.max(ROOM * scenario.planner.waypoints) + 2;
+        assert!((3..=most).contains(&route.len()), "{}", route.len());
+        let model = Model::new(&scenario);
+        let straight = vec![scenario.start, scenario.target];
+        assert_eq!(lifted_over(&model, straight.clone(), &|| true), straight);
     }
 
     /// The best way leads over the first wall, which is long, and round the end of the second, which is soft.

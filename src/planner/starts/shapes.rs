@@ -182,7 +182,7 @@ pub(super) fn along_strings(
     let waypoints = scenario.planner.waypoints;
     let mut follow = |obstacles: &Obstacles, count: usize| {
         for string in taut_strings_until(obstacles, count, is_over).strings {
-            shapes.push(along(model, &string));
+            shapes.push(along(model, &string, is_over));
             if scenario.terrain.is_flat() {
                 round.push(tangents::corners(scenario, &string, waypoints));
             }
@@ -309,13 +309,13 @@ fn flown<'r>(
 }
 
 /// The route along `string`, in the middle of the band where it can be reached.
-fn along(model: &Model, string: &TautString) -> Vec<Point3> {
+fn along(model: &Model, string: &TautString, is_over: &dyn Fn() -> bool) -> Vec<Point3> {
     let scenario = model.scenario;
     let corners = tangents::corners(scenario, string, scenario.planner.waypoints.min(COARSE));
     let mut route = vec![scenario.start];
     route.extend(corners.iter().map(|&corner| lifted(scenario, corner, 0.5)));
     route.push(scenario.target);
-    over::lifted_over(model, route)
+    over::lifted_over(model, route, is_over)
 }
 
 #[cfg(test)]

@@ -23,6 +23,9 @@ const STRAIGHT: f64 = 1e-9;
 /// Half of the sharpest turn at a corner, radians: where the string turns back, sharper ones would be far away.
 const STEEPEST: f64 = 1.2;
 
+/// A bend that needs more corners than a route has waypoints cannot be flown, and gets no more than these.
+const MOST_UNFLOWN: usize = 64;
+
 /// The corners of the route that follows `string` on the outside: as few as the turn limit allows, and as many more, up
 /// to `waypoints`, as shorten it most.
 ///
@@ -36,9 +39,10 @@ pub(in crate::planner) fn corners(
     let min_leg = scenario.vehicle.min_leg * (1.0 + 1e-6);
     let bends = bends(arcs(string), min_leg);
     let max_turn = scenario.vehicle.max_turn() * (1.0 - 1e-6);
+    let most = scenario.planner.waypoints.max(MOST_UNFLOWN);
     let mut counts: Vec<usize> = bends
         .iter()
-        .map(|bend| bend.least_corners(max_turn))
+        .map(|bend| bend.least_corners(max_turn).min(most))
         .collect();
     let mut left = waypoints.saturating_sub(counts.iter().sum());
     while left > 0 {

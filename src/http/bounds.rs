@@ -1,12 +1,18 @@
-//! The bounds of plans whose partial results are asked for: each takes up to a fifth of a second to compute, depends on
-//! the scenario alone, and callers ask again and again.
+//! The bounds of plans whose partial results are asked for: each mostly takes up to a fifth of a second to compute and a
+//! second at most, and callers ask again and again.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use parking_lot::Mutex;
 
 use crate::job::PlanId;
+use crate::scenario::Scenario;
+use crate::seeding::lower_bound_until;
+
+/// What is not proven within this, among many threats and corners, is left to the plan's end.
+const LONGEST: Duration = Duration::from_secs(1);
 
 /// For so many plans a bound is remembered.
 const MOST: usize = 256;
@@ -16,8 +22,15 @@ const MOST: usize = 256;
 pub struct Bounds(Arc<Mutex<VecDeque<(PlanId, f64)>>>);
 
 impl Bounds {
-    /// The bound of a plan, which is computed if it is not known.
-    pub(super) fn of(&self, id: PlanId, compute: impl FnOnce() -> f64) -> f64 {
+    /// The bound of a plan of `scenario`, which is computed if it is not known.
+    pub(super) fn of_plan(&self, id: PlanId, scenario: &Scenario) -> f64 {
+        self.of(id, || {
+            let began = Instant::now();
+            lower_bound_until(scenario, &|| began.elapsed() >= LONGEST)
+        })
+    }
+
+    fn of(&self, id: PlanId, compute: impl FnOnce() -> f64) -> f64 {
         if let Some(known) = self.known(id) {
             return known;
         }

@@ -11,7 +11,6 @@ use crate::job::{Event, Plan};
 use crate::planner;
 use crate::scenario::Scenario;
 use crate::scenario::json::{self, Rules};
-use crate::seeding;
 
 /// Maximum number of points of the curve in it, the newest.
 const CURVE: usize = 10_000;
@@ -40,7 +39,7 @@ pub(super) async fn result(
     let (rules, bounds, plan) = (state.rules.clone(), state.bounds.clone(), plan.clone());
     let measure = move |scenario: &String| {
         let _rooms = (&curve_room, &scenario_room);
-        let lower = |scenario: &Scenario| bounds.of(plan.id, || seeding::lower_bound(scenario));
+        let lower = |scenario: &Scenario| bounds.of_plan(plan.id, scenario);
         let origin = plan.origin(scenario, run_ms.max(0) as f64);
         measure(scenario, &rules, best, lower, curve, origin).map(Some)
     };

@@ -20,6 +20,12 @@ pub(super) fn for_room(stats: &Stats, capacity: Capacity) -> u64 {
     seconds(runs * mean_run_ms(stats) / capacity.all_workers(Some(stats)) as f64)
 }
 
+/// As [`for_room`], where the counts may be unknown: an answer that needs nothing else of the store is given although
+/// the store fails.
+pub(super) fn for_room_if_known<E>(stats: Result<Stats, E>, capacity: Capacity) -> u64 {
+    stats.map_or(seconds(UNKNOWN_RUN_MS), |stats| for_room(&stats, capacity))
+}
+
 /// Seconds until an active plan is likely to end: those before it in the queue, and its own run.
 pub(super) fn for_end(plan: &Plan, stats: &Stats, capacity: Capacity) -> u64 {
     let waiting =

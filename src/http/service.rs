@@ -23,7 +23,8 @@ pub(super) async fn readyz(
     _: NoParams,
 ) -> Result<Response, Problem> {
     if *state.phase.borrow() != Phase::Serving {
-        let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
+        let stats = state.store.stats().await;
+        let retry_after_s = retry::for_room_if_known(stats, state.capacity);
         return Err(Problem::Draining { retry_after_s });
     }
     let health = state.readiness.shared(state.store.health()).await;

@@ -42,7 +42,7 @@ pub(in crate::http) fn submit(
         if asked.validate_only {
             return validated(&state, &caller, asked.announced, body).await;
         }
-        let draining = refusal_when_draining(&state).await?;
+        let draining = refusal_when_draining(&state).await;
         // A repeated request is answered all the same: it asks for no other plan.
         if asked.once.is_none()
             && let Some(refusal) = draining
@@ -238,12 +238,13 @@ fn accepted(plan: Plan, address: HeaderValue) -> Response {
 }
 
 /// The refusal of new plans while the service is about to end.
-async fn refusal_when_draining(state: &AppState) -> Result<Option<Problem>, Problem> {
+async fn refusal_when_draining(state: &AppState) -> Option<Problem> {
     if *state.phase.borrow() == Phase::Serving {
-        return Ok(None);
+        return None;
     }
-    let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
-    Ok(Some(Problem::Draining { retry_after_s }))
+    let stats = state.store.stats().await;
+    let retry_after_s = retry::for_room_if_known(stats, state.capacity);
+    Some(Problem::Draining { retry_after_s })
 }
 
 /// The checksum of a document, off the request threads if it is long.

@@ -199,6 +199,32 @@ fn namespaces_and_attributes_are_read_in_linear_time() {
     read(long("<kml>", |_| format!("<a{attributes}/>"), "</kml>"));
 }
 
+/// Nothing can be worked out from such arcs: their airspaces are listed, and take nothing from the next.
+#[test]
+fn arcs_that_make_no_sense_are_listed() {
+    let arcs = [
+        ("DA 1,nan,90", "no number"),
+        ("DA 1,0,nan", "no number"),
+        ("DA 5000,0,180", "at most 1000000"),
+        (
+            "DB 47:30:00 N 008:33:00 E,47:24:00 N 060:42:00 E",
+            "at most 1000000",
+        ),
+    ];
+    for (arc, reason) in arcs {
+        let file = format!(
+            "AC R\nAN odd\nAL GND\nAH FL10\nV X=47:24:00 N 008:33:00 E\n{arc}\n\n\
+             AC R\nAN next\nAL GND\nAH FL10\nV X=47:24:00 N 008:33:00 E\nDC 1\n"
+        );
+        let found = convert_for_a_flight(file.as_bytes(), Syntax::Lines).expect("a scenario");
+        let threats = found.scenario["threats"].as_array().expect("a list");
+        assert_eq!(threats.len(), 1, "{arc}");
+        assert_eq!(threats[0]["name"], "next");
+        let is_told = found.unused.iter().any(|part| part.reason.contains(reason));
+        assert!(is_told, "{arc}: {:?}", found.unused);
+    }
+}
+
 /// A short line may stand for many corners: there is an end to them.
 #[test]
 fn arcs_and_long_edges_are_worked_out_at_little_cost() {

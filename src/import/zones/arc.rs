@@ -9,6 +9,9 @@ use crate::geometry::geodesy::{LatLon, TangentPlane};
 /// Steps of a whole circle: between two of them an arc strays from its corners by a thousandth of its radius.
 const STEPS: f64 = 72.0;
 
+/// No arc of a real zone is as wide, metres, and the plane it is worked out in is exact no further.
+const WIDEST_M: f64 = 1e6;
+
 /// A part of a circle, or of a spiral where the ends are not equally far from the centre.
 #[derive(Debug)]
 pub(super) struct Arc {
@@ -22,7 +25,23 @@ pub(super) struct Arc {
 
 impl Arc {
     /// Round `center` from one bearing and distance to another.
-    pub(super) fn new(center: Place, from: [f64; 2], to: [f64; 2], is_clockwise: bool) -> Self {
+    pub(super) fn new(
+        center: Place,
+        from: [f64; 2],
+        to: [f64; 2],
+        is_clockwise: bool,
+    ) -> Result<Self, String> {
+        if let Some(radius) = [from[1], to[1]]
+            .into_iter()
+            .find(|radius| !(*radius > 0.0 && *radius <= WIDEST_M))
+        {
+            return Err(format!(
+                "an arc with a radius of {radius} m, must be > 0 and at most {WIDEST_M}"
+            ));
+        }
+        if !(from[0].is_finite() && to[0].is_finite()) {
+            return Err("an arc with an angle that is no number".to_owned());
+        }
         let turn = (to[0] - from[0]).rem_euclid(TAU);
         // From a bearing to itself it is a whole circle.
         let turn = match (is_clockwise, turn > 0.0) {
@@ -31,16 +50,21 @@ impl Arc {
             (true, false) => TAU,
             (false, false) => -TAU,
         };
-        Self {
+        Ok(Self {
             plane: TangentPlane::at(LatLon::from(center), 0.0),
             from,
             turn,
             to_radius: to[1],
-        }
+        })
     }
 
     /// Round `center` from one place to another.
-    pub(super) fn between(center: Place, from: Place, to: Place, is_clockwise: bool) -> Self {
+    pub(super) fn between(
+        center: Place,
+        from: Place,
+        to: Place,
+        is_clockwise: bool,
+    ) -> Result<Self, String> {
         let plane = TangentPlane::at(LatLon::from(center), 0.0);
         let [from, to] = [from, to].map(|place| {
             let at = plane.local(LatLon::from(place)).coords;

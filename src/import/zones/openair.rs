@@ -189,12 +189,9 @@ impl Part {
                 place(&arc.start)?,
                 place(&arc.end)?,
                 is_clockwise(arc.direction),
-            )),
+            )?),
             PolygonSegment::ArcSegment(arc) => {
                 let radius = metres(arc.radius);
-                if !(radius.is_finite() && radius > 0.0) {
-                    return Err(format!("the radius of an arc is {radius}, must be > 0"));
-                }
                 let [from, to] = [arc.angle_start, arc.angle_end]
                     .map(|degrees| [f64::from(degrees) * TAU / 360.0, radius]);
                 Self::Arc(Arc::new(
@@ -202,7 +199,7 @@ impl Part {
                     from,
                     to,
                     is_clockwise(arc.direction),
-                ))
+                )?)
             }
         })
     }

@@ -1,5 +1,5 @@
-# The service in an image that holds the program, the C library and nothing else: no shell, no package
-# manager, no root. Run it with a read-only root file system; everything that it writes goes to /data:
+# The service in an image that holds the program, the C library and the certificates that webhooks are
+# verified with: no shell, no package manager, no root. Run it with a read-only root file system; everything that it writes goes to /data:
 #
 #     docker build -t noctule .
 #     docker run --read-only -p 127.0.0.1:8080:8080 -v noctule:/data noctule
@@ -23,7 +23,7 @@ RUN mkdir src benches \
 
 COPY src src
 COPY openapi.yaml ./
-COPY docs/PROBLEMS.md docs/
+COPY docs/*.md docs/
 COPY scenarios scenarios
 # Cargo compares modification times, and the copied files may be older than the build above.
 RUN touch src/lib.rs src/main.rs \

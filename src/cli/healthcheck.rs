@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         ask(address, authority.as_str(), path).with_context(|| format!("no answer from {url}"))?;
     match head.split(' ').nth(1) {
         Some("200") => Ok(()),
-        Some(status) => bail!("{url} answers {status}"),
+        Some(status) => bail!("http://{authority}{path} answers {status}"),
         None => bail!("{url} does not speak HTTP"),
     }
 }

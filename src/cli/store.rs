@@ -1,8 +1,8 @@
 //! `noctule store`: what an operator does with the embedded store.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::{anyhow, bail};
+use anyhow::{Context as _, anyhow, bail};
 use clap::{Args, Subcommand};
 
 use super::{config, exit, files};
@@ -72,7 +72,7 @@ pub(super) fn run(command: Command) -> anyhow::Result<u8> {
         Command::Backup { place, file } => {
             let instead = "nats stream backup, or nats account backup, copies what they keep (docs/OPERATIONS.md)";
             let data_dir = place.data_dir(instead)?;
-            upkeep::backup(&data_dir, &file)?;
+            upkeep::backup(&data_dir, &file).with_context(|| plans_of(&data_dir))?;
             files::print(&format!(
                 "the plans of {} are written to {}\n",
                 data_dir.display(),
@@ -83,7 +83,7 @@ pub(super) fn run(command: Command) -> anyhow::Result<u8> {
         Command::Check { place } => {
             let instead = "nats server check jetstream, and nats stream report, say how they are (docs/OPERATIONS.md)";
             let data_dir = place.data_dir(instead)?;
-            let findings = upkeep::check(&data_dir)?;
+            let findings = upkeep::check(&data_dir).with_context(|| plans_of(&data_dir))?;
             let (plans, faults) = (findings.plans, findings.faults.len());
             let mut lines = findings.faults;
             lines.push(format!(
@@ -98,4 +98,9 @@ pub(super) fn run(command: Command) -> anyhow::Result<u8> {
             })
         }
     }
+}
+
+/// Where a failure is: flags, variables and file together say which directory is looked at.
+fn plans_of(data_dir: &Path) -> String {
+    format!("the plans of {}", data_dir.display())
 }

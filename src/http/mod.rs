@@ -215,6 +215,7 @@ pub fn routes() -> Vec<Route> {
         on(GET, "/page/{file}", Nothing, pages::front::file),
         on(GET, "/page/vendor/{file}", Nothing, pages::front::vendored),
         on(GET, "/docs", Nothing, pages::docs),
+        on(GET, "/docs/{guide}", Nothing, pages::guides::guide),
         on(GET, "/problems/{slug}", Nothing, pages::problem),
     ]
 }

@@ -59,6 +59,7 @@ async fn every_described_route_reaches_a_handler() {
             .replace("/terrains/{name}", "/terrains/nowhere")
             .replace("/page/vendor/{file}", "/page/vendor/three.js")
             .replace("/page/{file}", "/page/main.js")
+            .replace("{guide}", "terrain")
             .replace("{slug}", "gone");
         assert!(!uri.contains('{'), "{operation}: {uri}");
         let answer = api.send(method, &uri, &[], "").await;
@@ -176,16 +177,10 @@ async fn the_description_is_the_same_as_yaml_and_as_json() {
 async fn the_reference_page_is_complete() {
     let answer = Api::new().get("/docs").await;
     let page = std::str::from_utf8(&answer.body).expect("UTF-8");
-    let attributes = |name: &str| {
-        let opening = format!(" {name}=\"");
-        let parts = page.split(&opening).skip(1);
-        let values = parts.map(|part| part.split('"').next().expect("one at least").to_owned());
-        values.collect::<Vec<_>>()
-    };
-    let places: BTreeSet<String> = attributes("id").into_iter().collect();
+    let places: BTreeSet<String> = attributes(page, "id").into_iter().collect();
     assert_eq!(
         places.len(),
-        attributes("id").len(),
+        attributes(page, "id").len(),
         "an id stands for one place"
     );
     for (path, item) in DESCRIPTION["paths"].as_object().expect("paths") {
@@ -202,13 +197,69 @@ async fn the_reference_page_is_complete() {
             "{name} is not there"
         );
     }
-    for link in attributes("href") {
+    for link in attributes(page, "href") {
         match link.strip_prefix('#') {
             Some(place) => assert!(places.contains(place), "{link} leads nowhere"),
             None => assert!(link.starts_with('/'), "{link} leads elsewhere"),
         }
     }
-    assert!(attributes("src").is_empty(), "nothing is loaded");
+    assert!(attributes(page, "src").is_empty(), "nothing is loaded");
+}
+
+/// The values of all attributes called `name` in `page`.
+fn attributes(page: &str, name: &str) -> Vec<String> {
+    let opening = format!(" {name}=\"");
+    let parts = page.split(&opening).skip(1);
+    let values = parts.map(|part| part.split('"').next().expect("one at least").to_owned());
+    values.collect()
+}
+
+/// All guides that are described are served, listed by the reference, and have links that lead to a place.
+#[tokio::test]
+async fn guides_are_served_and_lead_somewhere() {
+    let api = Api::new();
+    let text = async |path: &str| {
+        let answer = api.get(path).await;
+        assert_eq!(answer.status, 200, "{path}");
+        String::from_utf8(answer.body.to_vec()).expect("UTF-8")
+    };
+    let mut named: Vec<String> = Vec::new();
+    each(&DESCRIPTION, "", &mut |_, node| {
+        let words = node["description"].as_str().unwrap_or_default();
+        let links = words.split("](").skip(1);
+        named.extend(links.filter_map(|link| Some(link.split_once(')')?.0.to_owned())));
+    });
+    let parameter = &DESCRIPTION["paths"]["/docs/{guide}"]["get"]["parameters"][0];
+    let guides = parameter["schema"]["enum"].as_array().expect("a list");
+    let listed = attributes(&text("/docs").await, "href");
+    let mut links = 0;
+    for guide in guides {
+        let path = format!("/docs/{}", guide.as_str().expect("a name"));
+        assert!(listed.contains(&path), "{path} is not listed");
+        let page = text(&path).await;
+        let places = attributes(&page, "id");
+        let distinct: BTreeSet<&String> = places.iter().collect();
+        assert_eq!(distinct.len(), places.len(), "{path}: {places:?}");
+        named.extend(attributes(&page, "href").into_iter().map(|link| {
+            if link.starts_with('#') {
+                format!("{path}{link}")
+            } else {
+                link
+            }
+        }));
+    }
+    for link in named.iter().filter(|link| link.starts_with('/')) {
+        let (path, place) = link.split_once('#').unwrap_or((link, ""));
+        let page = text(path).await;
+        let found = place.is_empty() || attributes(&page, "id").contains(&place.to_owned());
+        assert!(found, "{link} leads nowhere");
+        links += 1;
+    }
+    assert!(links > 100, "{links}");
+    let elsewhere = |link: &&String| !link.starts_with('/') && !link.starts_with("https://");
+    assert_eq!(named.iter().find(elsewhere), None);
+    let unknown = api.get("/docs/page").await;
+    unknown.expect_problem(404, "not-found");
 }
 
 /// Each operation has a call that can be copied: with a body where it takes one, and without places to be filled in
@@ -236,7 +287,7 @@ async fn calls_of_the_reference_page_are_complete() {
 #[tokio::test]
 async fn pages_load_nothing_but_their_own_style() {
     let api = Api::new();
-    for path in ["/docs", "/problems/queue-full"] {
+    for path in ["/docs", "/docs/terrain", "/problems/queue-full"] {
         let answer = api.get(path).await;
         let page = std::str::from_utf8(&answer.body).expect("UTF-8");
         let style = page.split("<style>").nth(1).expect("a style");
@@ -298,7 +349,12 @@ async fn every_problem_type_leads_to_its_page() {
         let (_, main) = page.split_once("<main>").expect("the section");
         for link in main.split("href=\"").skip(1) {
             let (link, _) = link.split_once('"').expect("an address");
-            let linked = api.get(&format!("/problems/{link}")).await;
+            let address = if link.starts_with('/') {
+                link.to_owned()
+            } else {
+                format!("/problems/{link}")
+            };
+            let linked = api.get(&address).await;
             assert_eq!(linked.status, 200, "{link} on the page of {slug}");
         }
     }

@@ -1,9 +1,10 @@
-//! Pages for people: the planning page, the API reference, and one page for each type of problem.
+//! Pages for people: the planning page, the API reference, the guides, and one page for each type of problem.
 //!
-//! The reference and the problem pages are generated once, from the documents that programs read, and load nothing
-//! else: no script, no font, one style sheet within the page, whose hash the page's policy names.
+//! All but the planning page are generated from documents of the project, and load nothing else: no script, no font,
+//! one style sheet within the page, whose hash the page's policy names.
 
 pub(super) mod front;
+pub(super) mod guides;
 mod markdown;
 mod reference;
 mod schema;

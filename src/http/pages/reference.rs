@@ -4,7 +4,7 @@ use std::fmt::{self, Write as _};
 
 use serde_json::Value;
 
-use super::{escape, markdown, schema};
+use super::{escape, guides, markdown, schema};
 
 /// Where a service listens by default; the page does not know how its reader reaches this one.
 const LOCAL: &str = "http://localhost:8080";
@@ -45,7 +45,12 @@ impl<'a> Page<'a> {
         ));
         writeln!(
             out,
-            "<p>For programs: <a href=\"/openapi.json\">openapi.json</a>, <a href=\"/openapi.yaml\">openapi.yaml</a>.</p></header>"
+            "<p>For programs: <a href=\"/openapi.json\">openapi.json</a>, <a href=\"/openapi.yaml\">openapi.yaml</a>.</p>"
+        )?;
+        writeln!(
+            out,
+            "<h2 id=\"guides\">Guides</h2>\n<ul>\n{}</ul></header>",
+            guides::links()
         )?;
         let operations = self.operations();
         write_contents(&operations, out)?;

@@ -98,7 +98,7 @@ fn whole(guide: &Guide) -> String {
         );
     }
     let body = format!(
-        "<p><a href=\"/docs\">Reference</a></p>\n<nav><ul>\n{contents}</ul></nav>\n<main>{}</main>",
+        "<p><a href=\"/docs\">Reference</a></p>\n<nav aria-label=\"Contents\"><ul>\n{contents}</ul></nav>\n<main>{}</main>",
         document.html
     );
     page(&format!("Noctule: {}", guide.title()), &body)

@@ -23,7 +23,7 @@ RUN mkdir src benches \
 
 COPY src src
 COPY openapi.yaml ./
-COPY docs/*.md docs/
+COPY docs docs
 COPY scenarios scenarios
 # Cargo compares modification times, and the copied files may be older than the build above.
 RUN touch src/lib.rs src/main.rs \

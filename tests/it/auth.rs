@@ -219,7 +219,9 @@ async fn every_route_requires_the_scope_that_the_description_states() {
         assert_eq!(described, &Value::from(expected), "{place}");
 
         let request = place.replace("{id}", NOBODY).replace("{slug}", "not-found");
-        let request = request.replace("{name}", "paper-1");
+        let request = request
+            .replace("{name}", "paper-1")
+            .replace("{guide}", "terrain");
         let request = request
             .replace("vendor/{file}", "vendor/three.js")
             .replace("{file}", "main.js");

@@ -58,7 +58,7 @@ enum Location {
 }
 
 impl Directories {
-    /// Uploads in `uploads`, which is created if necessary.
+    /// Uploads in `uploads`, which is reached, and created if necessary, when it is first needed.
     #[must_use]
     pub fn new(uploads: PathBuf, mounted: Option<Mounted>) -> Self {
         Self::with_grace(uploads, mounted, GRACE)
@@ -68,9 +68,7 @@ impl Directories {
     #[must_use]
     pub fn with_grace(uploads: PathBuf, mounted: Option<Mounted>, grace: Duration) -> Self {
         let directory = uploads;
-        let own = Self::at(Location::Own { directory, grace }, mounted);
-        own.reach();
-        own
+        Self::at(Location::Own { directory, grace }, mounted)
     }
 
     /// Uploads on a shelf shared with other nodes, which is reached when it is first needed. Mounted files belong to

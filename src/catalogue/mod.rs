@@ -48,7 +48,7 @@ pub trait Catalogue: Datasets {
     /// [`CatalogueError::Unavailable`].
     fn list(&self) -> Result<Vec<Entry>, CatalogueError>;
 
-    /// Number and total size of the datasets, as far as known without waiting.
+    /// Number and total size of the datasets. Looks at the mounted directory.
     fn tally(&self) -> Tally;
 
     /// One dataset, with everything that can be found out about it.
@@ -74,8 +74,8 @@ pub trait Catalogue: Datasets {
     /// it, whatever is uploaded under the name right after.
     ///
     /// # Errors
-    /// [`CatalogueError::Mounted`], [`CatalogueError::Exists`], [`CatalogueError::Changed`],
-    /// [`CatalogueError::Owned`], [`CatalogueError::Full`], [`CatalogueError::TooMany`],
+    /// [`CatalogueError::Mounted`], [`CatalogueError::Exists`], [`CatalogueError::Absent`],
+    /// [`CatalogueError::Changed`], [`CatalogueError::Owned`], [`CatalogueError::Full`], [`CatalogueError::TooMany`],
     /// [`CatalogueError::Unavailable`].
     fn keep(
         &self,

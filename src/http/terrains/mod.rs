@@ -10,13 +10,17 @@ mod receive;
 mod upload;
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::Json;
 use axum::extract::{FromRequestParts, Path, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use parking_lot::Mutex;
 use serde::Serialize;
+use tokio::sync::Semaphore;
+use tokio::time::timeout;
 
 pub(super) use elevations::elevations;
 pub(super) use receive::SLOWEST;
@@ -43,6 +47,8 @@ const CHECKS: usize = 2;
 const READS: usize = 4;
 /// Requests that may ask for names and records at the same time.
 const RECORDS: usize = 16;
+/// Who asks for their number waits no longer than this for a count of them.
+const COUNTING: Duration = Duration::from_millis(500);
 
 /// The datasets, and limits on concurrent work with them.
 #[derive(Clone)]
@@ -53,6 +59,10 @@ pub struct Terrains {
     checks: Places,
     reads: Places,
     records: Places,
+    /// What they came to when they were last counted.
+    counted: Arc<Mutex<Tally>>,
+    /// The turn to count them.
+    counting: Arc<Semaphore>,
 }
 
 impl Terrains {
@@ -65,6 +75,8 @@ impl Terrains {
             checks: Places::new(CHECKS, Busy::Datasets),
             reads: Places::new(READS, Busy::Datasets),
             records: Places::new(RECORDS, Busy::Datasets),
+            counted: Arc::default(),
+            counting: Arc::new(Semaphore::new(1)),
         }
     }
 
@@ -81,11 +93,20 @@ impl Terrains {
         Ok(records.await??)
     }
 
-    /// How many there are, as far as is known at once; never waits behind other work.
+    /// How many there are; as they were counted last while somebody else counts them, or that takes long. A directory
+    /// that does not answer thus holds one thread and nobody who asks.
     pub(super) async fn tally(&self) -> Tally {
-        let catalogue = self.catalogue.clone();
-        let tally = tokio::task::spawn_blocking(move || catalogue.tally()).await;
-        tally.unwrap_or_default()
+        if let Ok(turn) = self.counting.clone().try_acquire_owned() {
+            let (catalogue, counted) = (self.catalogue.clone(), self.counted.clone());
+            let count = tokio::task::spawn_blocking(move || {
+                let tally = catalogue.tally();
+                *counted.lock() = tally;
+                drop(turn);
+            });
+            // What takes longer is there for the next who asks.
+            _ = timeout(COUNTING, count).await;
+        }
+        *self.counted.lock()
     }
 
     /// Do work that reads from datasets, once few enough others do.

@@ -1,6 +1,5 @@
 //! The planning threads: each calls the engine and builds the ending.
 
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::thread;
@@ -91,7 +90,7 @@ impl Task {
         // Nobody listens when the pool was dropped.
         let _ = self
             .ended
-            .send(end.unwrap_or_else(|payload| Run::Ended(panicked(&*payload))));
+            .send(end.unwrap_or_else(|_| Run::Ended(panicked())));
         // Whoever is woken by the end of the events finds the ending there.
         drop(reporter);
     }
@@ -152,16 +151,8 @@ fn ending(outcome: &Outcome, plan: &Plan, scenario: &str, run_ms: f64) -> Ending
     }
 }
 
-fn panicked(payload: &(dyn Any + Send)) -> Ending {
-    let message = payload
-        .downcast_ref::<&str>()
-        .copied()
-        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("no message");
-    tracing::error!(
-        panic = message,
-        "the planner panicked; its plan fails, the others go on"
-    );
+/// What a plan ends with whose planner panicked, which the log of panics tells of.
+fn panicked() -> Ending {
     let detail = "the planner broke on this scenario; the service's log says where";
     Ending::Failed(FailureKind::PlannerPanic.because(detail))
 }

@@ -49,7 +49,7 @@ impl Location {
     /// The directory of the service with the same flags, variables and file.
     fn data_dir(self, instead: &str) -> anyhow::Result<PathBuf> {
         let config = config::of_environment(&Flags::with_file(self.config))?.config;
-        // An empty variable counts as unset.
+        // `--store ""` counts as none.
         let given = self.store.filter(|store| !store.is_empty());
         let store: Backend = match given {
             Some(store) => store

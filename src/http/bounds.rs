@@ -17,7 +17,7 @@ const LONGEST: Duration = Duration::from_secs(1);
 /// For so many plans a bound is remembered.
 const MOST: usize = 256;
 
-/// The bounds of the plans that were asked for last.
+/// The bounds that were computed last.
 #[derive(Debug, Clone, Default)]
 pub struct Bounds(Arc<Mutex<VecDeque<(PlanId, f64)>>>);
 

@@ -139,8 +139,8 @@ impl Pricer<'_> {
     }
 
     /// Violation and cost of one leg by itself, but for the violation of `suspects`; its lanes have
-    /// the slots from `slot` on. Without `HEIGHTS` it is not asked for those that it keeps, without `FLIGHT`
-    /// for nothing else.
+    /// the slots from `slot` on. Without `HEIGHTS` the heights that it must keep are left out, without
+    /// `FLIGHT` everything else.
     #[inline(always)]
     pub(super) fn single_leg<S: Simd, const FLIGHT: bool, const HEIGHTS: bool>(
         &self,

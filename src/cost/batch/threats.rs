@@ -203,7 +203,7 @@ impl Span {
 }
 
 impl Disc {
-    /// As `exposure`, of legs that only climb.
+    /// As `exposure_within`, of legs that only climb.
     #[inline(always)]
     fn hover_exposure<S: Simd>(
         &self,

@@ -275,7 +275,6 @@ fn a_file_without_ends_is_no_scenario() {
     );
 }
 
-/// As our own exports write a triangle round a pole.
 #[test]
 fn heights_of_polygons_and_those_that_are_null_are_told_or_forgotten() {
     let mut features = ends();

@@ -182,8 +182,8 @@ impl Servers {
         self.client.connection_state() == Connection::Connected
     }
 
-    /// Retry idempotent work while the servers refuse it with an error that passes with an election. Like the free
-    /// [`outlast`], for work that cannot be sent between threads.
+    /// Retry idempotent work while the servers refuse it with an error that passes with an election. Unlike the
+    /// free [`outlast`] it can be awaited on any thread.
     ///
     /// # Errors
     /// The last error of `work`.

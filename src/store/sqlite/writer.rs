@@ -1,5 +1,5 @@
 //! The one thread that writes: it drains its channel into a transaction, commits, and only then
-//! answers, so that many callers share one wait for the disk.
+//! answers, so that many callers share one wait for the disk. (What is claimed early is handed out before.)
 
 use std::collections::{HashMap, VecDeque};
 use std::fs::File;

@@ -30,7 +30,7 @@ pub struct Polygon {
     /// Spatial index; `None` if there are few vertices.
     index: Option<Index>,
     is_convex: bool,
-    /// `None` if no part of the soft zone is known to belong to a single edge or corner.
+    /// `None` for a ring with notches and too many corners to find them.
     zones: Option<Vec<Zone>>,
     /// Which part of the soft zone belongs to which edge and corner.
     cells: Box<Cells>,

@@ -56,7 +56,8 @@ struct Side {
     length: f64,
 }
 
-/// The zones of the simple ring through `vertices`, `margin` wide; `None` if no part belongs to one feature.
+/// The zones of the simple ring through `vertices`, `margin` wide; `None` for one with notches and
+/// so many corners that its parts take too long to find.
 pub(super) fn zones(vertices: &[Point2], is_convex: bool, margin: f64) -> Option<Vec<Zone>> {
     let sides = Sides::of(vertices, is_convex, margin);
     if !sides.is_convex && vertices.len() > MOST_VERTICES {

@@ -41,12 +41,8 @@ struct Corner {
 /// `path` must satisfy the path constraints of `scenario`; the legs then do, too.
 pub(super) fn reduce(scenario: &Scenario, path: &[Point3], shape: Shape) -> Vec<Point3> {
     let near = Scenario {
-        threats: Vec::new(),
-        ..scenario.clone()
-    };
-    let near = Scenario {
         threats: within_reach(scenario, path, 2.0 * shape.tolerance_m),
-        ..near
+        ..scenario.clone()
     };
     let reduction = Reduction {
         model: Model::new(&near),

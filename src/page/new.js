@@ -9,16 +9,30 @@ export const EMPTY = {
 
 /** Where no map has been open: in the middle of the shipped ones. */
 const SOMEWHERE = { lat: 36.59, lon: -84.25 };
-/** Degrees to the north of a way of some 400 m. */
+/** Degrees to the north: of some 400 m that the ends are away from the middle, and of 3 km to the edges of the area. */
 const AWAY = 0.0036;
+const EDGE = 0.027;
 
 /** A scenario in degrees with nothing in it, where `document` is, whose places `frame` turns to metres. */
 export function emptyInDegrees(document, frame) {
-  const { lat, lon } = isGeodetic(document) && frame ? frame.from({ x: 0, y: 0, z: 0 }) : SOMEWHERE;
-  const [north, east] = [AWAY, AWAY / Math.max(0.01, Math.cos((lat * Math.PI) / 180))];
+  const { lat, lon } = isGeodetic(document) && frame ? middleOf(document, frame) : SOMEWHERE;
+  const stretch = 1 / Math.max(0.01, Math.cos((lat * Math.PI) / 180));
   const empty = { name: 'untitled', frame: 'wgs84', altitude_datum: 'msl' };
-  const place = (sign) => written(empty, { lat: lat + sign * north, lon: lon + sign * east, alt: 50 });
-  return { ...empty, start: place(-1), target: place(1), threats: [], terrain: { kind: 'flat', elevation: 0 }, altitude: { min: 20, max: 120 } };
+  const place = (off, alt) => {
+    const beside = lon + off * stretch;
+    return written(empty, { lat: lat + off, lon: beside - 360 * Math.round(beside / 360), alt });
+  };
+  return {
+    ...empty, start: place(-AWAY, 50), target: place(AWAY, 50), area: { min: place(-EDGE), max: place(EDGE) },
+    threats: [], terrain: { kind: 'flat', elevation: 0 }, altitude: { min: 20, max: 120 },
+  };
+}
+
+/** Between start and target; of a document that lacks one, where its frame begins. */
+function middleOf({ start, target }, frame) {
+  const [a, b] = [start, target].map((end) => frame.to(end ?? {}));
+  const [x, y] = [(a.x + b.x) / 2, (a.y + b.y) / 2];
+  return frame.from(Number.isFinite(x + y) ? { x, y, z: 0 } : { x: 0, y: 0, z: 0 });
 }
 
 /** What adds to the draft: `add(kind)` a threat, `addCorner(threat)`, and `addPeak()`. */

@@ -250,8 +250,10 @@ test('a scenario in degrees is drawn from nothing, and its route is taken to a g
   assert.ok(!(await grounds()).includes('Dataset of the service'), 'metres are nowhere on earth');
   await page.click('#empty-in-degrees');
   await drawn(page, 0);
-  const { frame, start, target } = await document_(page);
+  const { frame, start, target, area } = await document_(page);
   assert.deepEqual([frame, start.lat < target.lat, start.lon < target.lon], ['wgs84', true, true]);
+  const [low, high] = await page.evaluate((corners) => corners.map(globalThis.noctule.toMetres), [area.min, area.max]);
+  assert.ok(high.x - low.x > 5000 && high.y - low.y > 5000, 'there is room to draw a mission of some kilometres');
   assert.ok((await grounds()).includes('Dataset of the service'));
   await page.waitForSelector('.faults', { state: 'hidden' });
   await page.click('#plan');

@@ -10,6 +10,9 @@ const AGAIN_MS = 3000;
 const UNCHECKED = 'The service cannot be reached: what has changed in the scenario is not checked.';
 const MAY_NOT_PLAN = 'This key may look at plans, but may not plan: the scenario is not checked.';
 
+/** Higher than any ground. */
+const ALOFT_M = 9000;
+
 /** Shows faults in `editor`, and has `stage` draw the ground that the service knows. */
 export function checkAsItChanges(draft, editor, stage) {
   let checking = null;
@@ -25,12 +28,14 @@ export function checkAsItChanges(draft, editor, stage) {
       await stage.sample(scenario, signal);
     } catch (refusal) {
       if (refusal.status) over(UNCHECKED);
-      if (refusal.problem?.errors) editor.mark(refusal.problem.errors);
-      else if (refusal instanceof Unreachable) {
+      const faults = refusal.problem?.errors;
+      if (faults) {
+        editor.mark(faults);
+        if (faults.every(({ code }) => code === 'below-ground')) await sampleAbove(draft.document, stage, signal);
+      } else if (refusal instanceof Unreachable) {
         hold(UNCHECKED, 'bad');
         setTimeout(() => signal.aborted || check(), AGAIN_MS);
-      }
-      else if (refusal.status === 403) hold(MAY_NOT_PLAN, 'note');
+      } else if (refusal.status === 403) hold(MAY_NOT_PLAN, 'note');
       else if (refusal instanceof Said && refusal.status !== 401) tell(refusal.message);
     }
   });
@@ -39,4 +44,16 @@ export function checkAsItChanges(draft, editor, stage) {
     checking?.abort();
     check();
   });
+}
+
+/** The ground that ends lie under is drawn too, so that they can be placed on it. */
+async function sampleAbove(document, stage, signal) {
+  if (document.terrain?.kind !== 'dataset') return;
+  const aloft = { ...document, start: { ...document.start, alt: ALOFT_M }, target: { ...document.target, alt: ALOFT_M } };
+  try {
+    const { scenario } = await ask('/plans?validate_only=true', { method: 'POST', body: aloft, signal, quiet: true });
+    await stage.sample(scenario, signal);
+  } catch {
+    // The next check tries again.
+  }
 }

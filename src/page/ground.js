@@ -47,6 +47,12 @@ export function extentOf(document, frame) {
   return boxOf(places.length ? places : [{ x: -500, y: -500 }, { x: 500, y: 500 }], 0.12);
 }
 
+/** Whether what lies in `area` is of the place that a document is about. */
+export function isOf(area, document, frame) {
+  const [there, here] = [extentOf({ ...document, area }, frame), extentOf(document, frame)];
+  return ['x', 'y'].every((axis) => there.min[axis] < here.max[axis] && here.min[axis] < there.max[axis]);
+}
+
 function boxOf(places, margin) {
   const [xs, ys] = [places.map((p) => p.x), places.map((p) => p.y)];
   const box = { min: { x: Math.min(...xs), y: Math.min(...ys) }, max: { x: Math.max(...xs), y: Math.max(...ys) } };

@@ -4,7 +4,7 @@ import { ask } from './api.js';
 import { describe } from './describe.js';
 import { atMost, eachFrame } from './dom.js';
 import { axes, frameOf } from './frame.js';
-import { extentOf, groundOf } from './ground.js';
+import { extentOf, groundOf, isOf } from './ground.js';
 import { palette } from './palette.js';
 import { ceilingOf, threatsOf } from './volumes.js';
 import { Way } from './way.js';
@@ -134,6 +134,12 @@ export class Stage {
     this.#framed = terrain.name;
   }
 
+  /** What is known of the ground of a document: no other dataset's, and none of another place. */
+  #sampledFor(document) {
+    const { name, ground } = this.#sampled ?? {};
+    return ground && name === document.terrain?.name && isOf(ground.area, document, this.frame) ? ground : null;
+  }
+
   /** The plan's route in metres: its path, or its waypoints, or the best so far. */
   wayOf(plan) {
     const route = plan.result ? (plan.result.path?.points ?? plan.result.waypoints) : plan.latest?.waypoints;
@@ -159,7 +165,7 @@ export class Stage {
     this.frame = frameOf(document, this.frame);
     const key = [document.terrain, this.frame, JSON.stringify(extentOf(document, this.frame)), this.#sampled];
     if (!this.#groundKey || key.some((part, at) => part !== this.#groundKey[at])) {
-      this.ground = groundOf(document, this.frame, this.#sampled?.name === document.terrain?.name ? this.#sampled?.ground : null);
+      this.ground = groundOf(document, this.frame, this.#sampledFor(document));
       this.#groundKey = key;
     }
     // An incumbent moves nothing but the route.

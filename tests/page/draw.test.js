@@ -374,8 +374,23 @@ test('the ground of a dataset is drawn as the service has it', async (t) => {
   t.after(mapped.stop);
   const page = await open(chrome, mapped.url);
   await drawn(page, FIRST);
+  await page.waitForFunction(() => globalThis.noctule.scene().ground.columns === 201);
+  // Also under ends that lie below it; elsewhere nothing of it.
+  await page.click('#empty-in-degrees');
+  await drawn(page, 0);
+  await page.evaluate(() => { for (const part of document.querySelectorAll('details')) part.open = true; });
+  const sampled = page.waitForResponse((response) => response.url().includes('/scenarios:ground'));
+  await page.selectOption('[data-pointer="/terrain"]', 'dataset');
+  assert.equal((await sampled).status(), 200);
+  assert.match(await page.textContent('.faults'), /below the ground/);
+  await page.waitForFunction(() => globalThis.noctule.scene().ground.columns === 201);
+  const { area, start: low, target: high } = await document_(page);
+  const moved = (place) => ({ ...place, lat: place.lat + 10 });
+  const elsewhere = { ...(await document_(page)), start: moved(low), target: moved(high), area: { min: moved(area.min), max: moved(area.max) } };
+  await page.setInputFiles('#file', { name: 'elsewhere.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(elsewhere)) });
+  await page.waitForFunction(() => globalThis.noctule.document().start.lat > 46 && globalThis.noctule.scene().ground.kind === 'plane');
   await page.setInputFiles('#file', join(directory, 'jacksboro-wgs84.json'));
-  await page.waitForFunction(() => globalThis.noctule.document().terrain.kind === 'dataset');
+  await page.waitForFunction(() => globalThis.noctule.document().start.lat < 37);
   await page.waitForFunction(() => globalThis.noctule.scene().ground.columns === 201);
   await settled(page);
   const text = readFileSync(join(directory, 'jacksboro-wgs84.json'), 'utf8');

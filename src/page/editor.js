@@ -109,7 +109,9 @@ export class Editor {
   select(index) {
     if (index !== null) this.#turnTo(index);
     for (const card of this.root.querySelectorAll('.threat')) card.classList.toggle('chosen', Number(card.dataset.index) === index);
-    this.root.querySelector('.threat.chosen')?.scrollIntoView({ block: 'nearest' });
+    // Where the form is no column that scrolls by itself, the scene would go out of sight.
+    const column = this.root.parentElement;
+    if (column.scrollHeight > column.clientHeight) this.root.querySelector('.threat.chosen')?.scrollIntoView({ block: 'nearest' });
   }
 
   #turnTo(index) {

@@ -235,6 +235,18 @@ test('on a wide screen only the columns scroll', async () => {
   await page.done();
 });
 
+test('on a screen of middling width, what is placed in the scene leaves the scene in sight', async () => {
+  const page = await open(chrome, site.url, { viewport: { width: 1024, height: 768 } });
+  await drawn(page, FIRST);
+  await page.click('[data-tool=cylinder]');
+  await page.locator('#canvas').scrollIntoViewIfNeeded();
+  const at = await groundPoint(page, 0, 0);
+  await page.mouse.click(at.x, at.y);
+  await page.waitForSelector('.threat.chosen');
+  assert.equal(await page.evaluate(() => scrollY), 0);
+  await page.done();
+});
+
 test('a finger takes hold of the start', async () => {
   const page = await open(chrome, site.url, PHONE);
   await drawn(page, FIRST);

@@ -151,7 +151,7 @@ async function submit(warm) {
       inList(`“${status.name ?? 'The plan'}” is being planned`);
       return;
     }
-    if (warm && before) lay(before, `before: ${before.status.name ?? before.id.slice(0, 8)}`);
+    if (warm && before) layUnder(before);
     const plan = new Followed(status.id, { status });
     if (before) stepFrom(sent);
     show(plan);
@@ -255,6 +255,8 @@ function result(plan) {
 
 // -- Comparing -------------------------------------------------------------------------------------
 
+const BEFORE = 'before: ';
+
 function lay(plan, name) {
   const colours = palette();
   const taken = new Set([...stage.compared.values()].map((other) => other.slot));
@@ -263,6 +265,13 @@ function lay(plan, name) {
   stage.redraw();
   stage.drawSearch();
   remember();
+}
+
+/** A route from before, under the one that comes of it: in place of the oldest such where no more can be laid over. */
+function layUnder(plan) {
+  const laid = [...stage.compared];
+  if (laid.length >= OTHERS) lift((laid.find(([, { name }]) => name.startsWith(BEFORE)) ?? laid[0])[0]);
+  lay(plan, `${BEFORE}${plan.status.name ?? plan.id.slice(0, 8)}`);
 }
 
 function clearCompared() {

@@ -130,6 +130,10 @@ test('a threat moves, and the plan is made anew from the route there was', async
   // Before and after, once they are drawn: the verdict may come first.
   await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 2);
   await page.waitForFunction(() => /before: small/.test(document.getElementById('legend').textContent));
+  // No more are laid over than an address can name: the oldest goes.
+  for (let n = 0; n < 5; n += 1) await plan(page, '#replan');
+  await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 6);
+  assert.equal(await page.evaluate(() => location.hash.match(/[0-9a-f-]{36}/g).length), 6);
   await page.done();
 });
 

@@ -18,6 +18,8 @@ export class Plans {
   #past = [];
   #timer = null;
   #rows = [];
+  /** By plan, so that a click or a selection in a row is not lost as the list is read again. */
+  #drawn = new Map();
 
   /** `acts` has `open(status)`, `compare(status, yes)` and `removed(id)`; `marks()` says what is shown and compared. */
   constructor(root, acts, marks) {
@@ -76,26 +78,37 @@ export class Plans {
     const { shown, compared } = this.marks();
     const focused = this.body.contains(document.activeElement) ? document.activeElement.dataset.key : null;
     const row = focused ? document.activeElement.closest('tr').sectionRowIndex : null;
-    this.body.replaceChildren(...plans.map((plan) => this.#row(plan, shown === plan.id, compared.get(plan.id))));
-    if (focused) (this.body.querySelector(`[data-key="${CSS.escape(focused)}"]`) ?? this.body.rows[Math.min(row, this.body.rows.length - 1)]?.querySelector('button') ?? this.filter).focus();
+    this.#drawn = new Map(plans.map((plan) => [plan.id, this.#drawn.get(plan.id) ?? this.#row(plan)]));
+    const nodes = plans.map((plan) => this.#drawn.get(plan.id)(plan, shown === plan.id, compared.get(plan.id)));
+    if (nodes.length !== this.body.rows.length || nodes.some((node, at) => node !== this.body.rows[at])) this.body.replaceChildren(...nodes);
+    if (focused && !this.body.contains(document.activeElement)) (this.body.querySelector(`[data-key="${CSS.escape(focused)}"]`) ?? this.body.rows[Math.min(row, this.body.rows.length - 1)]?.querySelector('button') ?? this.filter).focus();
     this.older.disabled = !this.#next;
     this.newer.disabled = !this.#past.length && !this.#cursor;
   }
 
-  #row(plan, shown, color) {
+  /** A new row: what shows in it how a plan is now, and gives it back. */
+  #row(plan) {
     const name = nameOf(plan);
-    const tick = el('input', { type: 'checkbox', checked: Boolean(color), disabled: shown, data: { key: `lay ${plan.id}` }, 'aria-label': `Lay ${name} over`, onchange: () => this.acts.compare(plan, tick.checked) });
-    if (color) tick.style.accentColor = color;
-    const state = plan.status === 'running' ? `running, ${number(plan.progress * 100, 0)} %`
-      : plan.status === 'queued' && plan.queue_position ? `queued, ${plan.queue_position}.`
-        : plan.status === 'succeeded' && plan.feasible === false ? 'infeasible' : plan.status;
-    return el('tr', { class: shown ? 'chosen' : '', data: { plan: plan.id } },
-      el('th', { scope: 'row' },
-        el('button', { type: 'button', class: 'link', data: { key: `open ${plan.id}` }, onclick: () => this.acts.open(plan), 'aria-current': shown ? 'true' : undefined }, name),
-        el('span', { class: 'faint' }, el('i', { class: `light ${plan.status === 'succeeded' && plan.feasible === false ? 'infeasible' : plan.status}` }), `${state} · ${plan.algorithm}, seed ${plan.seed} · ${moment(plan.created_at)}`)),
-      el('td', {}, plan.best_cost === null ? '–' : cost(plan.best_cost)),
+    const open = el('button', { type: 'button', class: 'link', data: { key: `open ${plan.id}` }, onclick: () => this.acts.open(plan) }, name);
+    const [light, state, price] = [el('i'), el('span'), el('td')];
+    const tick = el('input', { type: 'checkbox', data: { key: `lay ${plan.id}` }, 'aria-label': `Lay ${name} over`, onchange: () => this.acts.compare(plan, tick.checked) });
+    const node = el('tr', { data: { plan: plan.id } },
+      el('th', { scope: 'row' }, open, el('span', { class: 'faint' }, light, state)),
+      price,
       el('td', {}, tick),
       el('td', {}, el('button', { type: 'button', class: 'quiet', data: { key: `remove ${plan.id}` }, 'aria-label': `Remove ${name}`, title: 'Remove', onclick: () => this.#remove(plan) }, '✕')));
+    return (now, shown, color) => {
+      plan = now;
+      node.className = shown ? 'chosen' : '';
+      if (shown) open.setAttribute('aria-current', 'true');
+      else open.removeAttribute('aria-current');
+      light.className = `light ${now.status === 'succeeded' && now.feasible === false ? 'infeasible' : now.status}`;
+      write(state, `${stateOf(now)} · ${now.algorithm}, seed ${now.seed} · ${moment(now.created_at)}`);
+      write(price, now.best_cost === null ? '–' : cost(now.best_cost));
+      Object.assign(tick, { checked: Boolean(color), disabled: shown });
+      tick.style.accentColor = color ?? '';
+      return node;
+    };
   }
 
   async #remove(plan) {
@@ -111,4 +124,15 @@ export class Plans {
     }
     this.look();
   }
+}
+
+function stateOf({ status, progress, queue_position: place, feasible }) {
+  if (status === 'running') return `running, ${number(progress * 100, 0)} %`;
+  if (status === 'queued' && place) return `queued, ${place}.`;
+  return status === 'succeeded' && feasible === false ? 'infeasible' : status;
+}
+
+/** Leaves alone what is said already: it may be selected. */
+function write(node, text) {
+  if (node.textContent !== text) node.textContent = text;
 }

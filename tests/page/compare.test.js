@@ -147,6 +147,11 @@ test('the list has states, a filter and pages, and lets go', async (t) => {
   await page.waitForSelector('.plans tbody tr');
   assert.equal(await page.locator('.plans tbody tr').count(), 20);
   assert.match(await page.textContent('.plans tbody tr'), /plan 22.*succeeded/s);
+  // Read again, the list keeps its rows, and what is selected in them.
+  await page.evaluate(() => getSelection().selectAllChildren(document.querySelector('.plans tbody tr th')));
+  await page.waitForResponse((response) => /\/plans\?/.test(response.url()));
+  await page.waitForResponse((response) => /\/plans\?/.test(response.url()));
+  assert.match(await page.evaluate(() => getSelection().toString()), /plan 22/);
   await page.click('#plans-older');
   await page.waitForFunction(() => document.querySelectorAll('.plans tbody tr').length === 3);
   await page.click('#plans-newer');

@@ -384,11 +384,12 @@ onStep(() => draft.document, ({ hash, own, draft: before }) => attempt(async () 
 by('plan').addEventListener('click', () => attempt(() => submit(false)));
 by('replan').addEventListener('click', () => attempt(() => submit(true)));
 by('cancel').addEventListener('click', () => stage.plan.status?.cancel_requested || attempt(() => stage.plan.cancel()));
-by('undo').addEventListener('click', () => draft.undo());
+const undo = () => stage.tools?.takeBack() || draft.undo();
+by('undo').addEventListener('click', undo);
 by('redo').addEventListener('click', () => draft.redo());
 
 by('plans').addEventListener('turned', () => plans.look(true));
-onUndoKeys(draft);
+onUndoKeys({ undo, redo: () => draft.redo() });
 onDrop((file) => attempt(() => openFile(file)));
 onPrint(world);
 

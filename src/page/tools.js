@@ -13,7 +13,7 @@ const TOOLS = [
   ['start', 'Start', 'Click on the ground to place the start.', 'Tap the ground to place the start.'],
   ['target', 'Target', 'Click on the ground to place the target.', 'Tap the ground to place the target.'],
   ['cylinder', 'Cylinder', 'Click on the ground to place a round threat; drag its dots for its radii.', 'Tap the ground to place a round threat; drag its dots for its radii.'],
-  ['polygon', 'Polygon', 'Click the corners one after another; Enter, a double click or a click on the first one closes it, Escape gives up.',
+  ['polygon', 'Polygon', 'Click the corners one after another; Enter, a double click or a click on the first one closes it, Ctrl+Z takes back the last one, Escape gives up.',
     'Tap the corners one after another; a tap on the first one closes it, Look gives up.'],
 ];
 /** What a tool says, to fingers or to a mouse. */
@@ -55,6 +55,15 @@ export class Tools {
     this.say(null);
     this.world.canvas.dataset.tool = tool;
     this.show();
+  }
+
+  /** Takes back the last corner of what is being drawn; says whether there was one. */
+  takeBack() {
+    if (!this.#corners.length) return false;
+    this.#corners.pop();
+    this.say(null);
+    this.show();
+    return true;
   }
 
   /** In place of what the tool says; null for that. */

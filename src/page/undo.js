@@ -2,8 +2,8 @@
 
 const TEXT = 'input[type=text], input[type=password]';
 
-/** Has them act on `draft`, except where the browser's own take back letters. */
-export function onUndoKeys(draft) {
+/** Has them call `undo()` and `redo()`, except where the browser's own take back letters. */
+export function onUndoKeys({ undo, redo }) {
   let before = null;
   addEventListener('focusin', ({ target }) => { before = target.value; });
   addEventListener('keydown', (event) => {
@@ -13,8 +13,8 @@ export function onUndoKeys(draft) {
     // In a field those typed since it has the focus.
     if (event.target.matches?.(TEXT) && event.target.value !== before) return;
     event.preventDefault();
-    if (key === 'y' || event.shiftKey) draft.redo();
-    else draft.undo();
+    if (key === 'y' || event.shiftKey) redo();
+    else undo();
     before = event.target.value;
   });
 }

@@ -307,6 +307,11 @@ test('a double click closes a polygon, and two corners are none', async () => {
   for (const { x, y } of places.slice(0, 2)) await page.mouse.click(x, y);
   await page.keyboard.press('Enter');
   assert.match(await page.textContent('#hint'), /three corners/);
+  // Undo takes back a corner, not what was drawn before.
+  await page.keyboard.press('Control+z');
+  assert.equal((await document_(page)).name, 'untitled');
+  assert.equal((await scene(page)).handles, 1);
+  await page.mouse.click(places[1].x, places[1].y);
   await page.mouse.dblclick(places[2].x, places[2].y);
   await drawn(page, 1);
   assert.equal((await document_(page)).threats[0].vertices.length, 3);

@@ -21,7 +21,7 @@ import { OTHERS, onSchemeChange, palette } from './palette.js';
 import { Plans } from './plans.js';
 import { onPrint } from './print.js';
 import { showResult } from './result.js';
-import { fileName, saveBlob, saveFrom } from './save.js';
+import { copyLink, fileName, saveBlob, saveFrom } from './save.js';
 import { World } from './scene.js';
 import { Stage } from './stage.js';
 import { begunWith, nameShown, named, onStep, stepFrom } from './steps.js';
@@ -244,11 +244,10 @@ function result(plan) {
     place: (violation) => stage.place(violation),
     save: (format) => attempt(() => saveFrom(`/plans/${plan.id}/result?format=${format.name}`, fileName(plan.scenario.name, format.file))),
     saveScenario: () => attempt(() => saveFrom(`/plans/${plan.id}/scenario`, fileName(plan.scenario.name, 'json'))),
-    savePicture: () => attempt(async () => saveBlob(await world.picture(), fileName(plan.scenario.name, 'png'))),
+    savePicture: world && (() => attempt(async () => saveBlob(await world.picture(), fileName(plan.scenario.name, 'png')))),
     copyLink: () => attempt(async () => {
       remember();
-      await navigator.clipboard.writeText(location.href);
-      tell('The link is in the clipboard. It opens this plan.', 'note');
+      tell(await copyLink(), 'note');
     }),
   });
 }

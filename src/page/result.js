@@ -6,7 +6,7 @@ import { cost, duration, metres, number, share, threatName } from './words.js';
 
 const FEW = 8;
 
-/** Draws it into `root`. `acts` has `mark(distance)`, `place(violation)`, `save(format)`, `saveScenario()`, `savePicture()` and `copyLink()`. */
+/** Draws it into `root`. `acts` has `mark(distance)`, `place(violation)`, `save(format)`, `saveScenario()`, `savePicture()` (null without a scene) and `copyLink()`. */
 export function showResult(root, { result, scenario, status, refusal, geodetic }, acts) {
   if (status?.status === 'failed' || (refusal && !result)) {
     const why = status?.error?.detail ?? refusal?.message ?? 'no route was found before the end';
@@ -69,7 +69,7 @@ function takeaway(result, geodetic, acts) {
     el('h3', { id: 'takeaway-head' }, 'Take it away'),
     el('p', { class: 'row wrap' }, offered.map(button),
       el('button', { type: 'button', id: 'save-scenario', onclick: () => acts.saveScenario() }, 'Scenario, JSON'),
-      el('button', { type: 'button', id: 'save-picture', onclick: () => acts.savePicture() }, 'View, PNG'),
+      acts.savePicture && el('button', { type: 'button', id: 'save-picture', onclick: () => acts.savePicture() }, 'View, PNG'),
       el('button', { type: 'button', id: 'copy-link', onclick: () => acts.copyLink() }, 'Copy link')),
     !result.feasible && geodetic && el('p', { class: 'faint', id: 'refused' }, 'A route that breaks its constraints is not given out in the formats that fly; the other formats are for looking at it.'));
 }

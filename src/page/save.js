@@ -1,4 +1,4 @@
-// Files handed to the person in front.
+// Files, and a link, handed to the person in front.
 
 import { send } from './api.js';
 
@@ -17,6 +17,16 @@ export async function saveFrom(path, name) {
   const answer = await send(path);
   const [, given] = answer.headers.get('content-disposition')?.match(/filename="([^"]+)"/) ?? [];
   saveBlob(await answer.blob(), given ?? name);
+}
+
+/** Puts the address of what is shown into the clipboard, which a page has none of over plain HTTP. Returns what to say of it. */
+export async function copyLink() {
+  try {
+    await navigator.clipboard.writeText(location.href);
+    return 'The link is in the clipboard. It opens this plan.';
+  } catch {
+    return `The browser lets this page copy nothing. The link to this plan is ${location.href}`;
+  }
 }
 
 /** A scenario's name as that of a file. */

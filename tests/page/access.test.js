@@ -160,5 +160,6 @@ test('without WebGL the form, the strip and the tables have everything', async (
   await plan(page);
   assert.equal(await page.locator('.verdict.good').count(), 1);
   assert.match(await page.textContent('#hint'), /no WebGL/);
+  assert.equal(await page.locator('#save-picture').count(), 0, 'there is no view to save');
   await page.done();
 });

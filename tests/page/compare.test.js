@@ -255,6 +255,10 @@ test('a plan is taken away: formats, scenario, picture, link', async () => {
   await again.waitForSelector('.verdict.good');
   assert.equal((await document_(again)).name, 'small');
   await again.done();
+  // Without a clipboard, as over plain HTTP, the link is shown.
+  await page.evaluate(() => Object.defineProperty(navigator, 'clipboard', { value: undefined }));
+  await page.click('#copy-link');
+  await page.waitForFunction(() => document.getElementById('notice').textContent.includes(location.href));
   await page.done();
 });
 

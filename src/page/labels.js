@@ -3,6 +3,7 @@
 import { el } from './dom.js';
 
 const MOST = 30;
+const NEEDED = /\b(end|chosen)\b/;
 /** Of letters: the style sheet cuts off more. */
 const LONG = 24;
 /** The style sheet lifts the ends' names over their dots. */
@@ -15,9 +16,11 @@ export class Labels {
     this.layer = layer;
   }
 
-  /** `[{place, text, kind}]`; those that there is no room for are left out, the last ones first. */
+  /** `[{place, text, kind}]`; those that there is no room for are left out, the last ones first, but start, target and what is chosen. */
   set(items) {
-    this.#items = items.slice(0, MOST).map(({ place, text, kind }) => ({ place, lift: /\bend\b/.test(kind) ? LIFT : 0, node: el('span', { class: kind }, text) }));
+    const needed = items.filter(({ kind }) => NEEDED.test(kind));
+    const others = items.filter(({ kind }) => !NEEDED.test(kind));
+    this.#items = [...needed, ...others].slice(0, MOST).map(({ place, text, kind }) => ({ place, lift: /\bend\b/.test(kind) ? LIFT : 0, node: el('span', { class: kind }, text) }));
     this.layer.replaceChildren(...this.#items.map((item) => item.node));
   }
 

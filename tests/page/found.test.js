@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { FIRST, SMALL, WALLED, around, color, contrasts, document_, drawn, fill, made, open, pixels, plan, scene, settled } from './support.js';
+import { FIRST, SMALL, WALLED, around, color, contrasts, document_, drawn, drop, fill, groundPoint, made, open, pixels, plan, scene, settled } from './support.js';
 import { chrome, site } from './together.js';
 
 const opened = async (id) => {
@@ -56,6 +56,19 @@ test('names in the scene cover no others', async () => {
   await drawn(page, FIRST);
   await settled(page);
   await apart(page, '#labels span:not([hidden])', 4);
+  await page.done();
+});
+
+test('of many threats the chosen one has its name', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  const threats = Array.from({ length: 40 }, (_, k) => ({ kind: 'cylinder', name: `mast ${k}`, center: { x: 60 + (k % 8) * 125, y: 200 + Math.floor(k / 8) * 140 }, radius: 10 }));
+  await drop(page, 'masts.json', JSON.stringify({ ...SMALL, threats }), 'application/json');
+  await drawn(page, 40);
+  const at = await groundPoint(page, threats[37].center.x - 500, threats[37].center.y - 500);
+  await page.mouse.click(at.x, at.y);
+  await page.waitForFunction(() => document.querySelector('#labels .chosen:not([hidden])')?.textContent === 'mast 37');
+  assert.equal(await page.locator('#labels .end').count(), 2);
   await page.done();
 });
 

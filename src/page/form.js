@@ -127,10 +127,10 @@ export class Form {
     return null;
   }
 
-  /** The field of a pointer; else the first below it. */
+  /** The field of a pointer; else the name at the head of the threat that it leads to; else the first below it. */
   fieldOf(pointer) {
     const find = (test) => this.#fields.find((field) => field.fault && test(field.pointer));
-    return find((own) => own === pointer) ?? find((own) => own.startsWith(`${pointer}/`)) ?? null;
+    return find((own) => own === pointer) ?? find((own) => own === pointer.replace(/^(\/threats\/\d+)(\/kind)?$/, '$1/name')) ?? find((own) => own.startsWith(`${pointer}/`)) ?? null;
   }
 }
 

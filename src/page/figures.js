@@ -1,7 +1,7 @@
 // The state of a plan in the header, and its figures beside the chart.
 
 import { by, el } from './dom.js';
-import { cost, number } from './words.js';
+import { cost, number, proven } from './words.js';
 
 /** Shows them. */
 export function showFigures(plan) {
@@ -54,5 +54,5 @@ function told({ status, result: end }, best) {
 export function verdict(plan) {
   if (!plan.result) return plan.status.status === 'cancelled' ? 'The plan was cancelled before a route was found.' : 'The plan has failed.';
   const { feasible, cost: price, bound } = plan.result;
-  return feasible ? `A route was found: cost ${cost(price.total)}${bound.gap === null ? '' : `, proven gap ${number(bound.gap * 100, 2)} per cent`}.` : 'No feasible route was found.';
+  return feasible ? `A route was found: cost ${cost(price.total)}${bound.gap === null ? '' : `, proven gap ${proven(bound.gap).replace('%', 'per cent')}`}.` : 'No feasible route was found.';
 }

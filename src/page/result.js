@@ -2,7 +2,7 @@
 
 import { el } from './dom.js';
 import { FORMATS } from './format.js';
-import { cost, duration, metres, number, share, threatName } from './words.js';
+import { cost, duration, metres, number, proven, share, threatName } from './words.js';
 
 const FEW = 8;
 
@@ -38,11 +38,11 @@ function verdict(result, scenario, acts) {
       ['Above ground', held.min_agl === null ? 'climbs and descents only' : `${number(held.min_agl)} to ${number(held.max_agl)} m`],
       ['Sharpest turn', `${number(checks.waypoints.max_turn_deg)}°`],
       ['Steepest climb', `${number(held.max_climb_deg)}°`],
-      ['Proven gap', share(bound.gap)],
+      ['Proven gap', proven(bound.gap)],
     ];
     return el('section', { class: 'verdict good', 'aria-labelledby': 'verdict-head' },
       el('h2', { id: 'verdict-head' }, 'The route holds'),
-      el('p', {}, stopped(result), ' ', bound.gap === null ? 'No bound could be proven.' : `No route of straight legs can be more than ${share(1 - 1 / (1 + bound.gap))} cheaper; that is proven.`, ' Near start and target the route may climb or descend outside the band; its height above ground is given for the rest.'),
+      el('p', {}, stopped(result), ' ', bound.gap === null ? 'No bound could be proven.' : `No route of straight legs can be more than ${proven(1 - 1 / (1 + bound.gap))} cheaper; that is proven.`, ' Near start and target the route may climb or descend outside the band; its height above ground is given for the rest.'),
       el('dl', { class: 'facts' }, facts.map(([name, value]) => el('div', {}, el('dt', {}, name), el('dd', {}, value)))));
   }
   return el('section', { class: 'verdict bad', 'aria-labelledby': 'verdict-head' },
@@ -86,7 +86,7 @@ function costs({ cost: terms, bound }, scenario) {
     el('table', { class: 'plain' }, el('thead', { class: 'unseen' }, el('tr', {}, el('th', {}, 'Term'), el('th', {}, 'Cost'), el('th', {}, 'Share'))), el('tbody', {},
       rows.map(([title, name], k) => el('tr', {}, el('th', { scope: 'row' }, el('i', { class: `swatch term-${k}` }), title, scenario?.weights && el('span', { class: 'faint' }, ` × ${scenario.weights[name] ?? 1}`)),
         el('td', {}, cost(terms[name])), el('td', {}, terms.total > 0 ? share(terms[name] / terms.total) : '–'))),
-      el('tr', {}, el('th', { scope: 'row' }, 'Proven bound'), el('td', {}, cost(bound.lower)), el('td', {}, bound.gap === null ? '–' : `gap ${share(bound.gap)}`)))));
+      el('tr', {}, el('th', { scope: 'row' }, 'Proven bound'), el('td', {}, cost(bound.lower)), el('td', {}, bound.gap === null ? '–' : `gap ${proven(bound.gap)}`)))));
 }
 
 /** None without threats. */

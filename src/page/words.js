@@ -19,6 +19,13 @@ export const cost = (value) => number(value, value >= 1e5 ? 0 : value >= 1000 ? 
 /** A share in per cent. */
 export const share = (value) => (value === null || value === undefined ? '–' : `${number(value * 100, value < 0.1 ? 2 : 1)} %`);
 
+/** A share that is proven to be no greater: never rounded down, but for the last bits of its sum. */
+export function proven(value) {
+  if (value === null || value === undefined) return share(value);
+  const scale = value < 0.1 ? 1e4 : 1e3;
+  return share(Math.ceil(value * scale - 1e-6) / scale);
+}
+
 /** Seconds as minutes and seconds. */
 export function duration(seconds) {
   if (seconds === null || seconds === undefined) return '–';

@@ -47,9 +47,9 @@ export class Chart {
     this.node.hidden = !points.length && !others.length;
     const colours = palette();
     const series = [
-      { label: 'mean', stroke: colours.mean, width: 1, values: curve(points, 'mean_cost') },
-      ...others.map((other) => ({ label: other.name, stroke: other.color, width: 1.5, values: curve(other.points, 'best_cost') })),
-      { label: 'best', stroke: color ?? colours.best, width: 2, values: curve(points, 'best_cost') },
+      { label: 'mean', stroke: colours.mean, width: 1, values: curve(points, meanOf) },
+      ...others.map((other) => ({ label: other.name, stroke: other.color, width: 1.5, values: curve(other.points, bestOf) })),
+      { label: 'best', stroke: color ?? colours.best, width: 2, values: curve(points, bestOf) },
     ];
     const columns = [...new Set(series.flatMap((one) => [...one.values.keys()]))].sort((a, b) => a - b);
     const lower = bound > 0 ? bound : null;
@@ -118,13 +118,17 @@ export class Chart {
   }
 }
 
+const bestOf = (point) => point.best_cost;
+/** None below the best, but for rounding: that of a swarm with fewer waypoints is one of coarser routes. */
+const meanOf = ({ mean_cost: mean, best_cost: best }) => (mean < best * (1 - 1e-9) ? null : mean);
+
 /** Iteration to value; the polished end, which shares the last iteration, stands one to its right. */
-function curve(points, field) {
+function curve(points, valueOf) {
   const values = new Map();
   let last = -1;
   for (const point of points) {
     last = Math.max(point.iteration, last + 1);
-    values.set(last, point[field]);
+    values.set(last, valueOf(point));
   }
   return values;
 }

@@ -2,11 +2,10 @@
 
 import { at } from './draft.js';
 import { el } from './dom.js';
+import { EITHER, detailOf } from './words.js';
 
 let gestures = 0;
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
-/** `1,000`: a thousand to one reader, one to the other. */
-const EITHER = /^[+-]?[1-9]\d{0,2},\d{3}$/;
 /** Where less than nothing makes sense. Keypads for decimals have no minus on some telephones. */
 const SIGNED = /\/(lat|lon|alt|x|y|z|elevation|base|top)$/;
 
@@ -99,7 +98,7 @@ export class Form {
     const left = [];
     for (const fault of faults) {
       const field = this.fieldOf(fault.pointer);
-      if (field) said.set(field, [...(said.get(field) ?? []), fault.detail]);
+      if (field) said.set(field, [...(said.get(field) ?? []), detailOf(fault, this.draft.document)]);
       else left.push(fault);
     }
     for (const field of this.#fields) {

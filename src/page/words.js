@@ -1,5 +1,7 @@
 // Numbers and states as people read them.
 
+import { at } from './draft.js';
+
 const plain = new Map();
 function digits(count) {
   if (!plain.has(count)) plain.set(count, new Intl.NumberFormat('en', { maximumFractionDigits: count, minimumFractionDigits: count }));
@@ -52,8 +54,20 @@ export function step(span, parts) {
   return (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10) * power;
 }
 
+/** `1,000`: a thousand to one reader, one to the other. */
+export const EITHER = /^[+-]?[1-9]\d{0,2},\d{3}$/;
+
+/** What is wrong in the words of the service, which does not know how a number may be read. */
+export function detailOf({ pointer, detail }, document) {
+  const value = at(document, pointer);
+  if (typeof value !== 'string' || !EITHER.test(value.trim())) return detail;
+  const [whole, decimals] = value.trim().split(',');
+  return `${value.trim()} can be read in two ways: write ${whole}${decimals} or ${whole}.${decimals.replace(/0{1,2}$/, '')}`;
+}
+
 /** What is wrong with a scenario, and with which of its ends or threats. */
-export function faultText({ pointer, detail }, document) {
+export function faultText(fault, document) {
+  const [pointer, detail] = [fault.pointer, detailOf(fault, document)];
   const [, end, index] = pointer.match(/^\/(start|target|threats\/(\d+))\/./) ?? [];
   if (!end) return detail;
   return `${index === undefined ? end : threatName(document.threats?.[index], index)}: ${detail}`;

@@ -180,6 +180,8 @@ test('numbers have a point or a comma, and what can be read in two ways is refus
     return (await document_(page)).altitude.max;
   };
   for (const [text, value] of [['120,5', 120.5], ['120.5', 120.5], ['1e3', 1000], ['0x10', '0x10'], ['1,000', '1,000'], ['1,2,3', '1,2,3'], ['Infinity', 'Infinity']]) assert.equal(await max(text), value);
+  await max('1,000');
+  await page.waitForFunction(() => document.getElementById('fault-altitude-max').textContent === '1,000 can be read in two ways: write 1000 or 1.0');
   assert.equal(await page.getAttribute('[data-pointer="/start/x"]', 'inputmode'), null, 'a keypad without a minus is not asked for');
   assert.equal(await page.getAttribute('[data-pointer="/altitude/max"]', 'inputmode'), 'decimal');
   await page.done();

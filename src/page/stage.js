@@ -221,12 +221,12 @@ export class Stage {
         this.#trailed = plan.latest;
       }
       const lines = new Map();
-      for (const other of others) lines.set(other.id, { points: other.way.points, color: other.color, width: 2.5 });
+      for (const other of others) lines.set(other.id, { points: other.way.drawn, color: other.color, width: 2.5 });
       // Where a route enters what it must not, it is inside of it, and has to be seen.
-      if (way) lines.set('route', { points: way.points, color, width: 4, through: broken ? 0.9 : undefined });
+      if (way) lines.set('route', { points: way.drawn, color, width: 4, through: broken ? 0.9 : undefined });
       if (this.#scrubbed) lines.set('then', { points: this.#scrubbed.points, color: colours.mean, width: 2.5 });
       this.world.routes(lines);
-      this.world.dress(waypoints?.points.slice(1, -1) ?? [], way?.points ?? null, color);
+      this.world.dress(waypoints?.points.slice(1, -1) ?? [], way?.drawn ?? null, color);
       this.world.faults(this.#faultPlaces(waypoints).map(({ place }) => place));
       this.world.canvas.setAttribute('aria-label', describe({ document: this.draft.document, ground: this.ground, threats: this.#threats, plan, way, compared: others.length }));
     }

@@ -1,6 +1,13 @@
 // A route as a way: how far along it each of its places lies, over ground.
 
+/** Of more points than this no eye can tell the line from that of fewer. */
+const MOST_DRAWN = 600;
+/** Cosine of the bend that is left out at most. */
+const BEND = Math.cos(Math.PI / 60);
+
 export class Way {
+  #drawn = null;
+
   constructor(points) {
     this.points = points;
     this.flown = [0];
@@ -11,6 +18,12 @@ export class Way {
     const heights = points.map((p) => p.z);
     this.least = heights.reduce((a, b) => Math.min(a, b), Infinity);
     this.greatest = heights.reduce((a, b) => Math.max(a, b), -Infinity);
+  }
+
+  /** Its points as far as its line needs them, which without a graphics processor takes long to draw. */
+  get drawn() {
+    this.#drawn ??= thinned(this.points);
+    return this.#drawn;
   }
 
   /** The place so far along it. */
@@ -41,4 +54,26 @@ export class Way {
     }
     return { distance: best, off };
   }
+}
+
+/** Both ends and every so many between them, and more where the route bends. */
+function thinned(points) {
+  const every = Math.ceil(points.length / MOST_DRAWN);
+  if (every === 1) return points;
+  const kept = [points[0]];
+  let [last, heading] = [0, towards(points[0], points[1])];
+  for (let k = 1; k + 1 < points.length; k += 1) {
+    const next = towards(points[k], points[k + 1]);
+    const cosine = next.reduce((sum, part, axis) => sum + part * heading[axis], 0);
+    if (k - last < every && cosine >= BEND) continue;
+    kept.push(points[k]);
+    [last, heading] = [k, next];
+  }
+  return [...kept, points.at(-1)];
+}
+
+function towards(a, b) {
+  const way = [b.x - a.x, b.y - a.y, b.z - a.z];
+  const length = Math.hypot(...way) || 1;
+  return way.map((part) => part / length);
 }

@@ -67,6 +67,19 @@ test('the route is drawn where it is, and a place in it is one place everywhere'
   await page.done();
 });
 
+test('a long route is drawn of few points, and known in all', async () => {
+  const far = { min: { x: 0, y: 0 }, max: { x: 31000, y: 31000 } };
+  const id = await made(site.url, { ...SMALL, area: far, target: { x: 30000, y: 30000, z: 50 }, threats: [{ kind: 'cylinder', center: { x: 15000, y: 15000 }, radius: 5000 }] });
+  const { path } = await ask(site.url, `/plans/${id}/result`);
+  assert.ok(path.points.length > 5000);
+  const page = await open(chrome, `${site.url}#plan=${id}`);
+  await page.waitForFunction(() => globalThis.noctule.scene()?.routes[0]?.points > 0);
+  assert.ok((await scene(page)).routes[0].points < 900);
+  const [end, target] = await page.evaluate(() => [globalThis.noctule.routeAt(1).x, globalThis.noctule.toMetres(globalThis.noctule.document().target).x]);
+  assert.ok(Math.abs(end - target) < 1);
+  await page.done();
+});
+
 test('a lost connection says so, and is taken up again without a loss', async (t) => {
   const line = await wire(site.url);
   t.after(line.stop);

@@ -2,7 +2,7 @@
 
 import { eachFrame } from './dom.js';
 import { onSchemeChange, palette } from './palette.js';
-import { metres, number, step } from './words.js';
+import { decimalsOf, metres, number, step } from './words.js';
 
 const SAMPLES = 400;
 const EDGE = { left: 46, right: 12, top: 10, bottom: 20 };
@@ -127,7 +127,7 @@ export class Strip {
     for (let z = Math.ceil(low / rise) * rise; z <= high; z += rise) {
       trace(pen, [[EDGE.left, y(z)], [EDGE.left + wide, y(z)]]);
       stroke(pen, colours.line, 1);
-      pen.fillText(number(z, 0), EDGE.left - 6, y(z));
+      pen.fillText(number(z, decimalsOf(rise)), EDGE.left - 6, y(z));
     }
     pen.textAlign = 'center';
     pen.textBaseline = 'top';
@@ -135,7 +135,7 @@ export class Strip {
     const far = length >= 10000;
     const way = step(length, Math.max(3, wide / 110));
     for (let s = 0; s <= length; s += way) {
-      pen.fillText(far ? `${+(s / 1000).toFixed(2)} km` : `${number(s, 0)} m`, Math.max(x(s), EDGE.left + 8), EDGE.top + tall + 5);
+      pen.fillText(far ? `${+(s / 1000).toFixed(2)} km` : `${number(s, decimalsOf(way))} m`, Math.max(x(s), EDGE.left + 8), EDGE.top + tall + 5);
     }
   }
 }

@@ -54,6 +54,9 @@ export function step(span, parts) {
   return (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10) * power;
 }
 
+/** So many decimals tell multiples of a step apart. */
+export const decimalsOf = (size) => Math.max(0, -Math.floor(Math.log10(size) + 1e-9));
+
 /** `1,000`: a thousand to one reader, one to the other. */
 export const EITHER = /^[+-]?[1-9]\d{0,2},\d{3}$/;
 

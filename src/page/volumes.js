@@ -150,7 +150,9 @@ export function threatsOf(document, frame, ground) {
   (document.threats ?? []).forEach((threat, index) => {
     const base = Number.isFinite(threat.base) ? threat.base : ground.least;
     const top = Number.isFinite(threat.top) ? threat.top : ceiling;
-    const common = { index, name: threat.name, low: base, high: Math.max(top, base + 1e-3) };
+    // Above all that is drawn it would be out of sight, and its outlines on the ground look like a threat there.
+    const low = Math.min(base, ceiling);
+    const common = { index, name: threat.name, low, high: Math.max(base < ceiling ? top : ceiling, low + 1e-3) };
     if (threat.kind === 'polygon') {
       const ring = (threat.vertices ?? []).filter(isPlace).map(frame.to);
       if (ring.length >= 3) drawn.push({ ...common, ring, margin: finite(threat.margin), center: null });

@@ -327,6 +327,7 @@ test('in colours that the system gives, the tool in hand and the curves can be t
   const style = (selector, what) => page.locator(selector).evaluateAll((nodes, name) => nodes.map((node) => getComputedStyle(node)[name]), what);
   assert.deepEqual(await style('#tools button[aria-pressed=true]', 'outlineStyle'), ['solid']);
   assert.ok((await style('#tools button[aria-pressed=false]', 'outlineStyle')).every((value) => value === 'none'));
+  await page.waitForFunction(() => /proven bound/.test(document.getElementById('legend').textContent));
   assert.equal(new Set(await style('#legend i', 'backgroundColor')).size, 3);
   await page.done();
 });

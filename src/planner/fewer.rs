@@ -1,6 +1,6 @@
 //! Removes waypoints from a route, one after the other, so that what is left keeps every limit.
 
-use super::finish::polish;
+use super::finish::{polish, refine};
 use super::log::Log;
 use super::newton::Newton;
 use super::polish::Steps;
@@ -48,9 +48,7 @@ pub(super) fn leave_out(
     }
     let (mut fitness, mut route) = left.swap_remove(0);
     if !fitness.is_feasible() {
-        let mut newton = Newton::new(model, log.stop);
-        fitness = newton.improve(&mut route, &[]);
-        log.evaluations += newton.evaluations;
+        fitness = refine(model, &mut route, &[], log);
     }
     Ok((fitness, route))
 }

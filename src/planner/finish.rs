@@ -58,6 +58,8 @@ const BACK_STEPS: Steps = Steps {
 pub(super) struct Leads<'r> {
     /// Routes that may become better once they are polished.
     pub(super) others: &'r [Vec<Point3>],
+    /// Routes of no search that lead elsewhere than its best start.
+    pub(super) grafts: &'r [Vec<Point3>],
     /// Routes that break limits.
     pub(super) beyond: &'r [Vec<Point3>],
     /// Ways round the threats as seen from above.
@@ -89,8 +91,11 @@ pub(super) fn finish(
         }
         let spent = log.evaluations - before;
         bring_home(model, leads.others, log);
-        if challenge(model, leads.others, spent, log) {
-            bring_home(model, &[], log);
+        // The first has been polished with the best.
+        for others in [leads.others.get(1..).unwrap_or_default(), leads.grafts] {
+            if challenge(model, others, spent, log) {
+                bring_home(model, &[], log);
+            }
         }
         round_off(model, leads.round, log);
         bring_within(model, leads.beyond, log);
@@ -105,9 +110,7 @@ pub(super) fn finish(
 /// Polish and refine `route`, and keep it if it is better than the best.
 pub(super) fn finish_from(model: &Model, mut route: Vec<Point3>, log: &mut Log) {
     polish(model, &mut route, LAST_STEPS, log);
-    let mut newton = Newton::new(model, log.stop);
-    let fitness = newton.improve(&mut route, &[]);
-    log.evaluations += newton.evaluations;
+    let fitness = refine(model, &mut route, &[], log);
     log.offer(&route, fitness);
 }
 
@@ -119,8 +122,8 @@ pub(super) fn bring_back(model: &Model, mut route: Vec<Point3>, log: &mut Log) {
 }
 
 /// The last metres decide which of two ways is cheaper: one of the `others`, which were no better than the best before
-/// the polish, may be better after it; returns whether one is. The first of them has been polished with the best. No
-/// challenger is begun when fewer routes are left to price than the `spent` ones of that polish.
+/// the polish, may be better after it; returns whether one is. No challenger is begun when fewer routes are left
+/// to price than the `spent` ones of that polish.
 fn challenge(model: &Model, others: &[Vec<Point3>], spent: u64, log: &mut Log) -> bool {
     let settings = &model.scenario.planner;
     let asked_for = settings.population * settings.iterations;
@@ -130,7 +133,8 @@ fn challenge(model: &Model, others: &[Vec<Point3>], spent: u64, log: &mut Log) -
     } else {
         CHALLENGERS
     };
-    let others = elsewhere(model, &log.route, others.iter().skip(1));
+    let others = elsewhere(model, &log.route, others);
+    let others = starts::different_first(model, &log.route, others);
     let mut has_won = false;
     for mut route in others.into_iter().take(challengers) {
         let is_over = log.evaluations + spent > most;
@@ -187,9 +191,7 @@ fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
     }
     let others = if is_free { &[] } else { others };
     let others = elsewhere(model, &route, others);
-    let mut newton = Newton::new(model, log.stop);
-    let fitness = newton.improve(&mut route, &others);
-    log.evaluations += newton.evaluations;
+    let fitness = refine(model, &mut route, &others, log);
     log.offer(&route, fitness);
 }
 
@@ -222,9 +224,8 @@ fn bring_within(model: &Model, beyond: &[Vec<Point3>], log: &mut Log) {
         if why_stop(model.scenario, log.stop).is_some() {
             return;
         }
-        let (mut newton, mut route) = (Newton::new(model, log.stop), route.clone());
-        let fitness = newton.improve(&mut route, &[]);
-        log.evaluations += newton.evaluations;
+        let mut route = route.clone();
+        let fitness = refine(model, &mut route, &[], log);
         log.offer(&route, fitness);
     }
 }
@@ -239,6 +240,19 @@ pub(super) fn polish(
     let mut polish = Polish::new(model, log.stop);
     let fitness = polish.descend(route, steps);
     log.evaluations += polish.evaluations(route.len() - 2);
+    fitness
+}
+
+/// Improve `route` by Newton's method, given `others` that lead elsewhere.
+pub(super) fn refine(
+    model: &Model,
+    route: &mut Vec<Point3>,
+    others: &[Vec<Point3>],
+    log: &mut Log,
+) -> Fitness {
+    let mut newton = Newton::new(model, log.stop);
+    let fitness = newton.improve(route, others);
+    log.evaluations += newton.evaluations;
     fitness
 }
 

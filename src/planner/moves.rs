@@ -118,11 +118,7 @@ impl<'s> Moves<'s> {
     }
 
     fn within(&self, [x, y, height]: Waypoint) -> Waypoint {
-        let area = &self.model.scenario.area;
-        let at = Point2::new(
-            x.clamp(area.min.x, area.max.x),
-            y.clamp(area.min.y, area.max.y),
-        );
+        let at = self.model.scenario.area.nearest(Point2::new(x, y));
         let (floor, ceiling) = self.model.heights_over(at);
         [at.x, at.y, height.clamp(floor, ceiling)]
     }

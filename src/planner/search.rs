@@ -63,7 +63,10 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
     if turning > 0 {
         let mut routes = Routes::guided(model, log.stop, &elites);
         let (search, why) = run(model, &mut routes, 0..=turning, log);
+        let others = elites.split_off(1);
+        let others = starts::different_first(model, &elites[0], others);
         best_starts = elites;
+        best_starts.extend(others);
         best_starts.truncate(RIVALS);
         elites = distinct(model, &routes, search.as_ref());
         reason = why;
@@ -89,7 +92,9 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         reason = why;
     }
     elites.extend(best_starts);
+    let grafts = whole(starts.grafts, log);
     let leads = Leads {
+        grafts: &grafts,
         others: &elites,
         beyond: &starts.beyond,
         round: &starts.round,

@@ -2,8 +2,9 @@
 //! slow descent, no small change brings a waypoint to a leg that follows the ground badly: the bend that it leaves would
 //! be too sharp, until all others of that bend have moved.
 
+use super::finish::refine;
 use super::log::Log;
-use super::newton::{self, Newton, dealt};
+use super::newton::{self, dealt};
 use super::recount::circles;
 use super::{StopReason, is_from_scratch, why_stop};
 use crate::cost::Model;
@@ -41,9 +42,7 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
             if let Some(reason) = why_stop(model.scenario, log.stop) {
                 return reason;
             }
-            let mut newton = Newton::new(model, log.stop);
-            let fitness = newton.improve(&mut route, &[]);
-            log.evaluations += newton.evaluations;
+            let fitness = refine(model, &mut route, &[], log);
             log.offer(&route, fitness);
         }
         if log.has_converged() {
@@ -60,6 +59,7 @@ mod tests {
     use super::*;
     use crate::geometry::Point3;
     use crate::planner::Nobody;
+    use crate::planner::newton::Newton;
     use crate::planner::tests::{Looks, descent};
     use crate::scenario::{Scenario, WarmStart};
     use crate::terrain::{Flat, Terrain};

@@ -13,8 +13,7 @@ const FARTHEST: f64 = 4.0;
 /// alone costs more is not cheaper.
 pub(super) fn detour(model: &Model, route: &[Point3]) -> Option<f64> {
     let scenario = model.scenario;
-    let quadrature = scenario.planner.quadrature;
-    let figures = model.assess(route, quadrature, model.tolerance, |_| {});
+    let figures = model.figures(route, scenario.planner.quadrature);
     let way = figures.fuel + figures.threat;
     let direct = (scenario.target - scenario.start).norm() * metre(scenario);
     (figures.threat > MUCH * way).then(|| (way / direct).min(FARTHEST))

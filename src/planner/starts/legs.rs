@@ -4,9 +4,10 @@
 use super::net::{self, Tree};
 use super::vast::Watch;
 use super::{few, may_turn};
-use crate::cost::batch::{LANES, Price, Pricer};
+use crate::cost::batch::{LANES, Pricer};
 use crate::cost::{Model, metre};
 use crate::geometry::Point3;
+use crate::optimizer::Fitness;
 use crate::planner::price::{pricer, search_tolerance};
 use crate::scenario::Scenario;
 
@@ -80,17 +81,16 @@ impl<'p, 's> Legs<'p, 's> {
             if !self.watch.may_go_on(ends.len()) {
                 return false;
             }
-            let [from, to] = net::rows(self.places, ends);
-            let mut prices = vec![Price::ZERO; from.len()];
-            if hilly {
-                self.pricer.legs_at_best(&from, &to, &mut prices);
-            } else {
-                self.pricer.legs(&from, &to, &mut prices);
-            }
-            for (idx, &(a, b)) in ends.iter().enumerate() {
-                let (price, lane) = (&prices[idx / LANES], idx % LANES);
-                if price.violation[lane] <= 0.0 {
-                    let cost = price.cost[lane] + own[a] + own[b];
+            let legs = net::priced(self.places, ends, |from, to, prices| {
+                if hilly {
+                    self.pricer.legs_at_best(from, to, prices);
+                } else {
+                    self.pricer.legs(from, to, prices);
+                }
+            });
+            for (&(a, b), leg) in ends.iter().zip(&legs) {
+                if leg.is_feasible() {
+                    let cost = leg.cost + own[a] + own[b];
                     (self.costs[a][b], self.costs[b][a]) = (cost, cost);
                 }
             }
@@ -120,21 +120,17 @@ impl<'p, 's> Legs<'p, 's> {
             .iter()
             .map(|&other| (other.min(place), other.max(place)))
             .collect();
-        let [from, to] = net::rows(self.places, &ends);
-        let mut prices = vec![Price::ZERO; from.len()];
-        if self.watch.may_go_on(ends.len()) {
-            self.pricer
-                .heights_of_legs(&from, &to, ends.len(), &mut prices);
+        // Where there is no time for them, none is used.
+        let legs = if self.watch.may_go_on(ends.len()) {
+            net::priced(self.places, &ends, |from, to, prices| {
+                self.pricer.heights_of_legs(from, to, ends.len(), prices);
+            })
         } else {
-            // None of them is used.
-            prices.fill(Price {
-                violation: [f64::INFINITY; LANES],
-                ..Price::ZERO
-            });
-        }
-        for (idx, &(a, b)) in ends.iter().enumerate() {
+            vec![Fitness::WORST; ends.len()]
+        };
+        for (&(a, b), leg) in ends.iter().zip(&legs) {
             (self.measured[a][b], self.measured[b][a]) = (true, true);
-            if prices[idx / LANES].violation[idx % LANES] > 0.0 {
+            if !leg.is_feasible() {
                 (self.costs[a][b], self.costs[b][a]) = (f64::INFINITY, f64::INFINITY);
             }
         }

@@ -2,8 +2,8 @@
 //! or below, just clear of it.
 
 use super::over::TOUCH;
-use super::{lifted, steepest};
-use crate::geometry::{Point2, Point3, Vector2};
+use super::{direction, lifted, steepest};
+use crate::geometry::{Point2, Point3};
 use crate::scenario::Scenario;
 
 /// Additional clearance from tops and bases, as a share of the band: a leg may slope by this much over a threat.
@@ -68,9 +68,9 @@ pub(super) fn about_ends(scenario: &Scenario, least: f64) -> Vec<Point3> {
         }
         places.extend(
             (0..DIRECTIONS)
-                .map(|direction| {
-                    let heading = std::f64::consts::TAU * direction as f64 / DIRECTIONS as f64;
-                    let way = Vector2::new(libm::cos(heading), libm::sin(heading)) * reach;
+                .map(|idx| {
+                    let heading = std::f64::consts::TAU * idx as f64 / DIRECTIONS as f64;
+                    let way = direction(heading) * reach;
                     end.xy() + way
                 })
                 .filter(|spot| scenario.area.contains(*spot))

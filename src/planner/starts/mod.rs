@@ -8,6 +8,7 @@ mod count;
 mod exposed;
 mod few;
 mod flanks;
+mod grafts;
 mod heap;
 mod height;
 mod known;
@@ -20,6 +21,7 @@ mod roadmap;
 mod round;
 mod rounded;
 mod shapes;
+mod sides;
 mod spare;
 mod surplus;
 pub(super) mod tangents;
@@ -36,6 +38,7 @@ pub(super) use heap::spread;
 pub(super) use height::steepest;
 pub(super) use known::given;
 pub(super) use round::at_heights_of;
+pub(super) use sides::different_first;
 pub(super) use vast::is_vast;
 
 use super::polish::{Polish, Steps};
@@ -71,6 +74,8 @@ pub(super) struct Starts {
     pub(super) routes: Vec<Vec<Point3>>,
     /// Routes with the requested number of waypoints that break limits, but may become better than all others.
     pub(super) beyond: Vec<Vec<Point3>>,
+    /// Routes that lead elsewhere than the best one, with its ends.
+    pub(super) grafts: Vec<Vec<Point3>>,
     /// Ways round the threats as seen from above, with as many corners as shorten them.
     pub(super) round: Vec<Vec<Point2>>,
     /// Routes priced on the way.
@@ -116,10 +121,19 @@ fn starts_from(
     evaluations += priced.len() as u64;
     // The known route goes first, so that others are refined only where they are already cheaper.
     priced[usize::from(is_known)..].sort_by(|one, other| one.0.rank(&other.0));
-    let mut beyond = Vec::new();
+    let (mut beyond, mut grafts) = (Vec::new(), Vec::new());
     if settings.polish {
         let hopeless = if is_known { 0.0 } else { hopeless };
+        if !is_known && grafts::are_wanted(model, is_rough) {
+            let grafted = grafts::grafted(model, &priced);
+            evaluations += grafted.legs_priced / (coarse as u64 + 1);
+            grafts = grafted.routes;
+        }
         refine(model, &mut priced, hopeless, stop, &mut evaluations);
+        let best = priced.first().map_or(Fitness::WORST, |(best, _)| *best);
+        let dearest = best.cost * (1.0 + hopeless);
+        grafts.retain(|(graft, _)| !best.is_feasible() || graft.cost <= dearest);
+        refine(model, &mut grafts, hopeless, stop, &mut evaluations);
         if is_rough && !model.scenario.terrain.is_flat() {
             let (routes, routes_priced) = wider::routes(model, &priced, stop);
             beyond = routes;
@@ -127,8 +141,11 @@ fn starts_from(
         }
     }
     priced.truncate(STARTS);
+    let routes =
+        |priced: Vec<(Fitness, Vec<Point3>)>| priced.into_iter().map(|(_, route)| route).collect();
     Some(Starts {
-        routes: priced.into_iter().map(|(_, route)| route).collect(),
+        routes: routes(priced),
+        grafts: routes(grafts),
         beyond,
         round: shapes.round,
         evaluations,

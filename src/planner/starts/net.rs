@@ -1,8 +1,9 @@
 //! Common parts of ways over the ground: a net of spots, and the cheapest chains through it.
 
 use crate::cost::Model;
-use crate::cost::batch::PointRow;
+use crate::cost::batch::{LANES, PointRow, Price};
 use crate::geometry::{Point2, Point3, Vector2};
+use crate::optimizer::Fitness;
 use crate::scenario::Scenario;
 
 /// Chains that are nowhere farther apart than this share of the direct way count as one.
@@ -70,11 +71,22 @@ pub(super) fn spots(scenario: &Scenario, count: usize, detour: f64) -> Spots {
     Spots { points, step }
 }
 
-/// Legs between `places`, by the numbers of their `ends`: from and to, side by side.
-pub(super) fn rows(places: &[Point3], ends: &[(usize, usize)]) -> [Vec<PointRow>; 2] {
+/// What `pricing`, given the rows of both ends, finds of the legs between `places`, by the numbers of their `ends`.
+pub(super) fn priced(
+    places: &[Point3],
+    ends: &[(usize, usize)],
+    pricing: impl FnOnce(&[PointRow], &[PointRow], &mut [Price]),
+) -> Vec<Fitness> {
     let side =
         |end: fn(&(usize, usize)) -> usize| PointRow::of(ends.iter().map(|ends| places[end(ends)]));
-    [side(|ends| ends.0), side(|ends| ends.1)]
+    let [from, to] = [side(|ends| ends.0), side(|ends| ends.1)];
+    let mut prices = vec![Price::ZERO; from.len()];
+    pricing(&from, &to, &mut prices);
+    let of = |idx: usize| Fitness {
+        violation: prices[idx / LANES].violation[idx % LANES],
+        cost: prices[idx / LANES].cost[idx % LANES],
+    };
+    (0..ends.len()).map(of).collect()
 }
 
 /// The cheapest chains from one place to all others.

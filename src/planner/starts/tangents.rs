@@ -1,5 +1,6 @@
 //! From a taut string to waypoints: every arc becomes the corners of a polygon drawn around it.
 
+use super::direction;
 use crate::geometry::{LEVEL, Point2, Vector2};
 use crate::scenario::Scenario;
 use crate::seeding::{Piece, TautString};
@@ -224,7 +225,7 @@ fn around(arc: &Arc, count: usize, min_leg: f64) -> impl Iterator<Item = Point2>
     let (center, reach) = (arc.center, radius / libm::cos(half));
     (0..count).map(move |corner| {
         let angle = first + sign * half * (2 * corner + 1) as f64;
-        center + Vector2::new(libm::cos(angle), libm::sin(angle)) * reach
+        center + direction(angle) * reach
     })
 }
 

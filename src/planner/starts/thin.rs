@@ -5,7 +5,7 @@ use std::cell::LazyCell;
 use super::shapes::MOST_COARSE;
 use super::{few, may_turn, may_turn_along, net};
 use crate::cost::Model;
-use crate::cost::batch::{LANES, Price, Pricer};
+use crate::cost::batch::Pricer;
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 use crate::planner::price::search_tolerance;
@@ -85,14 +85,13 @@ impl<'c> Legs<'c> {
                 next.map(move |b| (a, b))
             };
             let ends: Vec<(usize, usize)> = open.iter().flat_map(onward).collect();
-            let [from, to] = net::rows(chain, &ends);
-            let mut prices = vec![Price::ZERO; from.len()];
-            pricer.first_legs(&from, &to, ends.len(), &mut prices);
-            for (idx, &(a, b)) in ends.iter().enumerate() {
-                let (price, lane) = (&prices[idx / LANES], idx % LANES);
+            let legs = net::priced(chain, &ends, |from, to, prices| {
+                pricer.first_legs(from, to, ends.len(), prices);
+            });
+            for (&(a, b), leg) in ends.iter().zip(&legs) {
                 worth[a].push(Fitness {
-                    violation: price.violation[lane] + own[b].0,
-                    cost: price.cost[lane] + own[b].1,
+                    violation: leg.violation + own[b].0,
+                    cost: leg.cost + own[b].1,
                 });
             }
             open.retain(|&a| {

@@ -11,8 +11,9 @@ use std::collections::BinaryHeap;
 use super::lifted;
 use super::net::{self, Found, Spots, Tree};
 use super::thin::thin;
+use super::vast::Watch;
 use crate::cost::Model;
-use crate::cost::batch::{LANES, Price, Pricer};
+use crate::cost::batch::{LANES, Pricer};
 use crate::geometry::Point3;
 use crate::planner::price::{pricer, search_tolerance};
 use crate::scenario::Scenario;
@@ -47,9 +48,15 @@ pub(super) fn routes(
         if is_over() {
             break;
         }
-        let mut net = Net::new(model, &spots);
-        let trees = [0, net.places.len() - 1].map(|end| net.cheapest(end));
+        let Some(mut net) = Net::new(model, &spots, is_over) else {
+            break;
+        };
         found.legs_priced += net.legs_priced;
+        let last = net.places.len() - 1;
+        let (Some(out), Some(back)) = (net.cheapest(0), net.cheapest(last)) else {
+            break;
+        };
+        let trees = [out, back];
         for chain in net::chains(model, &net.places, &trees, count) {
             if is_over() {
                 break;
@@ -84,6 +91,7 @@ struct Net<'s> {
     /// For each place.
     legs: Vec<Vec<Leg>>,
     legs_priced: u64,
+    watch: Watch<'s>,
 }
 
 #[derive(Clone, Copy)]
@@ -106,7 +114,8 @@ struct Arrival {
 }
 
 impl<'s> Net<'s> {
-    fn new(model: &Model<'s>, spots: &Spots) -> Self {
+    /// `None` where there is no time for all its legs.
+    fn new(model: &Model<'s>, spots: &Spots, is_over: &'s dyn Fn() -> bool) -> Option<Self> {
         let scenario = model.scenario;
         let tolerance = search_tolerance(model);
         let pricer = pricer(model).verdicts();
@@ -122,9 +131,6 @@ impl<'s> Net<'s> {
                 }
             }
         }
-        let [from, to] = net::rows(&places, &ends);
-        let mut prices = vec![Price::ZERO; from.len()];
-        pricer.legs_at_best(&from, &to, &mut prices);
         // A route has one waypoint per certain distance, not one at every place.
         let way = (scenario.target - scenario.start).norm();
         let waypoints = (scenario.planner.waypoints + 1) as f64 / way;
@@ -133,31 +139,40 @@ impl<'s> Net<'s> {
             .map(|&place| model.waypoint(place, tolerance).1 * waypoints)
             .collect();
         let mut legs = vec![Vec::new(); places.len()];
-        for (idx, &(a, b)) in ends.iter().enumerate() {
-            let (price, lane) = (&prices[idx / LANES], idx % LANES);
-            if price.violation[lane] > 0.0 {
-                continue;
+        let mut watch = Watch::new(scenario, is_over);
+        for ends in ends.chunks(watch.most_unwatched) {
+            if !watch.may_go_on(ends.len()) {
+                return None;
             }
-            let length = (places[b] - places[a]).norm();
-            let cost = price.cost[lane] + 0.5 * (own[a] + own[b]) * length;
-            for (at, to) in [(a, b), (b, a)] {
-                legs[at].push(Leg {
-                    to,
-                    cost,
-                    measured: false,
-                });
+            let priced = net::priced(&places, ends, |from, to, prices| {
+                pricer.legs_at_best(from, to, prices);
+            });
+            for (&(a, b), leg) in ends.iter().zip(&priced) {
+                if !leg.is_feasible() {
+                    continue;
+                }
+                let length = (places[b] - places[a]).norm();
+                let cost = leg.cost + 0.5 * (own[a] + own[b]) * length;
+                for (at, to) in [(a, b), (b, a)] {
+                    legs[at].push(Leg {
+                        to,
+                        cost,
+                        measured: false,
+                    });
+                }
             }
         }
-        Self {
+        Some(Self {
             places,
             pricer,
             legs,
             legs_priced: ends.len() as u64,
-        }
+            watch,
+        })
     }
 
-    /// The cheapest chains from `source`.
-    fn cheapest(&mut self, source: usize) -> Tree {
+    /// The cheapest chains from `source`; `None` where there is no time to find them.
+    fn cheapest(&mut self, source: usize) -> Option<Tree> {
         let mut tree = Tree::from(source, self.places.len());
         let mut closed = vec![false; self.places.len()];
         let mut open = BinaryHeap::new();
@@ -184,11 +199,14 @@ impl<'s> Net<'s> {
                 few.extend(open.pop().map(|Reverse(next)| next));
             }
             few.retain(|next| !closed[next.place]);
+            if !self.watch.may_go_on(few.len()) {
+                return None;
+            }
             self.measure(&few);
             let good = |next: &Arrival| self.legs[next.via][next.leg].cost.is_finite();
             open.extend(few.into_iter().filter(good).map(Reverse));
         }
-        tree
+        Some(tree)
     }
 
     /// Add the chains that extend from `place` to those that are `open`.
@@ -217,12 +235,11 @@ impl<'s> Net<'s> {
             .iter()
             .map(|next| (next.via.min(next.place), next.via.max(next.place)))
             .collect();
-        let [from, to] = net::rows(&self.places, &ends);
-        let mut prices = vec![Price::ZERO; from.len()];
-        self.pricer
-            .heights_of_legs(&from, &to, ends.len(), &mut prices);
-        for (idx, &(a, b)) in ends.iter().enumerate() {
-            let breaks = prices[idx / LANES].violation[idx % LANES] > 0.0;
+        let heights = net::priced(&self.places, &ends, |from, to, prices| {
+            self.pricer.heights_of_legs(from, to, ends.len(), prices);
+        });
+        for (&(a, b), leg) in ends.iter().zip(&heights) {
+            let breaks = !leg.is_feasible();
             for (at, to) in [(a, b), (b, a)] {
                 for leg in self.legs[at].iter_mut().filter(|leg| leg.to == to) {
                     leg.measured = true;

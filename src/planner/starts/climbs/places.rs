@@ -3,7 +3,6 @@
 use super::super::{direction, net};
 use super::Climb;
 use crate::cost::Model;
-use crate::cost::batch::{LANES, Price};
 use crate::geometry::{Point2, Point3, Rect, Vector2};
 use crate::planner::price::pricer;
 use crate::scenario::Scenario;
@@ -81,22 +80,20 @@ pub(super) fn legs(model: &Model, places: &[Point2], levels: &[f64]) -> Vec<Leg>
     let ends: Vec<(usize, usize)> = (0..count)
         .flat_map(|a| (a + 1..count).map(move |b| (a, b)))
         .collect();
-    let [from, to] = net::rows(&points, &ends);
-    let mut prices = vec![Price::ZERO; from.len()];
-    pricer.legs_at_best(&from, &to, &mut prices);
+    let priced = net::priced(&points, &ends, |from, to, prices| {
+        pricer.legs_at_best(from, to, prices);
+    });
     let none = Leg {
         length: 0.0,
         heading: 0.0,
         cost: f64::INFINITY,
     };
     let mut legs = vec![none; count * count];
-    for (idx, &(a, b)) in ends.iter().enumerate() {
-        let (price, lane) = (&prices[idx / LANES], idx % LANES);
-        let breaks = price.violation[lane] > 0.0;
-        let cost = if breaks {
-            f64::INFINITY
+    for (&(a, b), leg) in ends.iter().zip(&priced) {
+        let cost = if leg.is_feasible() {
+            leg.cost
         } else {
-            price.cost[lane]
+            f64::INFINITY
         };
         let way = places[b] - places[a];
         for (from, to, way) in [(a, b, way), (b, a, -way)] {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::cost::Model;
-use crate::cost::batch::{LANES, Price, Pricer};
+use crate::cost::batch::Pricer;
 use crate::geometry::{LEVEL, Point2, Point3, Vector2};
 use crate::planner::price::{pricer, search_tolerance};
 use crate::planner::starts::net::{self, Spots};
@@ -100,20 +100,18 @@ impl<'s> Legs<'s> {
             .filter(|&to| may_climb(to))
             .map(|to| (from, to))
             .collect();
-        let [starts, targets] = net::rows(&self.places, &ends);
-        let mut prices = vec![Price::ZERO; starts.len()];
-        self.pricer
-            .first_legs(&starts, &targets, ends.len(), &mut prices);
+        let legs = net::priced(&self.places, &ends, |from, to, prices| {
+            self.pricer.first_legs(from, to, ends.len(), prices);
+        });
         self.count += ends.len() as u64;
-        let legs = ends.iter().enumerate().filter_map(|(idx, &(from, to))| {
-            let (price, lane) = (&prices[idx / LANES], idx % LANES);
+        let legs = ends.iter().zip(&legs).filter_map(|(&(from, to), leg)| {
             let way = self.places[to] - self.places[from];
             let heading = way.xy().normalize();
-            (price.violation[lane] <= 0.0).then(|| Leg {
+            leg.is_feasible().then(|| Leg {
                 to,
                 heading,
                 range: range(heading),
-                cost: price.cost[lane] + (self.own[from] + self.own[to]) * way.norm(),
+                cost: leg.cost + (self.own[from] + self.own[to]) * way.norm(),
             })
         });
         legs.collect()

@@ -137,6 +137,7 @@ impl Api {
         let mut api = Self::new();
         // A separate directory: the first one is in use.
         let catalogue = Arc::new(open(api.place.path().join("more")));
+        catalogue.reach();
         let rules = (*api.state.rules).clone().with_datasets(catalogue.clone());
         api.state.rules = Arc::new(rules);
         api.state.terrains = Terrains::new(catalogue);
@@ -172,6 +173,7 @@ impl Api {
         let (phase, watched) = watch::channel(Phase::Serving);
         let uploads = place.path().join("terrains");
         let catalogue = Arc::new(Directories::new(uploads.clone(), None));
+        catalogue.reach();
         let limits = Limits {
             body_bytes: 4096,
             ..Limits::default()

@@ -2,6 +2,7 @@
 
 import { Said, UNREACHABLE, Unreachable, ask } from './api.js';
 import { calmly } from './dom.js';
+import { axes } from './frame.js';
 import { hold, over, tell, untell } from './notice.js';
 
 const VALIDATE_MS = 300;
@@ -49,7 +50,9 @@ export function checkAsItChanges(draft, editor, stage) {
 /** The ground that ends lie under is drawn too, so that they can be placed on it. */
 async function sampleAbove(document, stage, signal) {
   if (document.terrain?.kind !== 'dataset') return;
-  const aloft = { ...document, start: { ...document.start, alt: ALOFT_M }, target: { ...document.target, alt: ALOFT_M } };
+  const [, , up] = axes(document);
+  const above = (end) => ({ ...end, [up]: ALOFT_M });
+  const aloft = { ...document, start: above(document.start), target: above(document.target) };
   try {
     const { scenario } = await ask('/plans?validate_only=true', { method: 'POST', body: aloft, signal, quiet: true });
     await stage.sample(scenario, signal);

@@ -16,11 +16,17 @@ const MOST: usize = 16;
 /// Of the cheapest joints, so many are looked at with the turns that they make.
 const CLOSE: usize = 8;
 
-/// Routes that begin or end as the best does, and what making them took.
+/// The price of no way.
+const NOTHING: Fitness = Fitness {
+    violation: 0.0,
+    cost: 0.0,
+};
+
+/// How many legs and routes were priced.
 #[derive(Default)]
-pub(super) struct Grafts {
-    pub(super) routes: Vec<(Fitness, Vec<Point3>)>,
-    pub(super) legs_priced: u64,
+pub(super) struct Effort {
+    pub(super) legs: u64,
+    pub(super) routes: u64,
 }
 
 /// Whether a search of `model` looks for them: over level ground, where ways lead through soft zones or narrow gaps, or an
@@ -41,99 +47,110 @@ pub(super) fn are_wanted(model: &Model, is_rough: bool) -> bool {
 
 /// Of each way past the threats the first of the `starts`, which are `priced` best first, with the beginning, the end,
 /// or both, of the best of all; those that are better for it.
-pub(super) fn grafted(model: &Model, starts: &[(Fitness, Vec<Point3>)]) -> Grafts {
-    let mut grafts = Grafts::default();
+pub(super) fn grafted(
+    model: &Model,
+    starts: &[(Fitness, Vec<Point3>)],
+) -> (Vec<(Fitness, Vec<Point3>)>, Effort) {
+    let (mut grafts, mut effort) = (Vec::new(), Effort::default());
     let Some(((_, best), others)) = starts.split_first() else {
-        return grafts;
+        return (grafts, effort);
     };
     let backwards = |route: &[Point3]| -> Vec<Point3> { route.iter().rev().copied().collect() };
+    let back = backwards(best);
     let mut met = vec![sides(model, best)];
     for (own, route) in others {
         let sides = sides(model, route);
         if met.contains(&sides) {
             continue;
         }
-        let begun = joined(model, best, route, &sides, &mut grafts.legs_priced);
-        let back: Vec<i32> = sides.iter().map(|side| -side).collect();
-        let begun = backwards(&begun);
-        let both = joined(
-            model,
-            &backwards(best),
-            &begun,
-            &back,
-            &mut grafts.legs_priced,
-        );
-        let both = with_waypoints(model, backwards(&both), route.len() - 2);
-        let fitness = price(model, &both);
+        let begun = joined(model, [best, route], &sides, &mut effort);
+        let sides_back: Vec<i32> = sides.iter().map(|side| -side).collect();
+        let ends = [&*back, &*backwards(&begun)];
+        let both = backwards(&joined(model, ends, &sides_back, &mut effort));
+        let graft = with_waypoints(model, both, route.len() - 2);
+        let fitness = price(model, &graft);
+        effort.routes += 1;
         if fitness.beats(own) {
-            grafts.routes.push((fitness, both));
+            grafts.push((fitness, graft));
         }
         met.push(sides);
         if met.len() > MOST {
             break;
         }
     }
-    grafts
+    (grafts, effort)
 }
 
-/// The best route that begins as `head` does, ends as `rest` does and passes the threats at these `sides`, by what its
-/// legs and waypoints cost: one leg leads from a waypoint of the one to one of the other. `rest` itself where none is
-/// better.
+/// The best route that begins as `head` does, ends as `rest` does and passes the threats at these `sides`; `rest` itself
+/// where none is better.
 fn joined(
+    model: &Model,
+    [head, rest]: [&[Point3]; 2],
+    wanted: &[i32],
+    effort: &mut Effort,
+) -> Vec<Point3> {
+    let joints = joints(model, head, rest, effort).into_iter();
+    let routes = joints.map(|(from, to)| [&head[..=from], &rest[to..]].concat());
+    let alike = routes.filter(|route| sides(model, route) == wanted);
+    // Turns decide among the cheapest.
+    let few = std::iter::once(rest.to_vec()).chain(alike.take(CLOSE));
+    let priced = few.map(|route| (price(model, &route), route));
+    let priced = priced.inspect(|_| effort.routes += 1);
+    let best = priced.min_by(|(one, _), (other, _)| one.rank(other));
+    best.expect("the rest is one of them").1
+}
+
+/// From which waypoint of `head` to which of `rest` a leg can lead so that the whole, turns apart, is better than `rest`:
+/// the cheapest first.
+fn joints(
     model: &Model,
     head: &[Point3],
     rest: &[Point3],
-    wanted: &[i32],
-    legs_priced: &mut u64,
-) -> Vec<Point3> {
+    effort: &mut Effort,
+) -> Vec<(usize, usize)> {
+    let across: Vec<(usize, usize)> = (1..head.len() - 1)
+        .flat_map(|from| (1..rest.len() - 1).map(move |to| (from, to)))
+        .collect();
     let places = [head, rest].concat();
-    let first = head.len();
-    // The legs of both, and those from each waypoint of the one to each of the other.
-    let along = |from: usize, count: usize| (from..from + count - 1).map(|at| (at, at + 1));
-    let across = (1..first - 1).flat_map(|from| {
-        let onto = first + 1..places.len() - 1;
-        onto.map(move |to| (from, to))
-    });
-    let own = along(0, first).chain(along(first, rest.len()));
-    let ends: Vec<(usize, usize)> = own.chain(across).collect();
-    *legs_priced += ends.len() as u64;
+    let along = |from: usize, count: usize| (from + 1..from + count).map(|at| (at - 1, at));
+    let own = along(0, head.len()).chain(along(head.len(), rest.len()));
+    let between = across.iter().map(|(from, to)| (*from, head.len() + to));
+    let ends: Vec<(usize, usize)> = own.chain(between).collect();
+    effort.legs += ends.len() as u64;
     let legs = net::priced(&places, &ends, |from, to, prices| {
         pricer(model).legs(from, to, prices);
     });
-    let leg = |idx: usize| (legs[idx].violation, legs[idx].cost);
+    let (of_head, legs) = legs.split_at(head.len() - 1);
+    let (of_rest, legs) = legs.split_at(rest.len() - 1);
     let tolerance = search_tolerance(model);
-    let waypoint = |place: usize| model.waypoint(places[place], tolerance);
-    let plus = |(a, b): (f64, f64), (c, d): (f64, f64)| (a + c, b + d);
-    // What it costs to reach each place of the head, and to get to the target from each of the rest.
-    let mut reached = vec![(0.0, 0.0); first];
-    for place in 1..first - 1 {
-        reached[place] = plus(reached[place - 1], plus(leg(place - 1), waypoint(place)));
-    }
-    let mut left = vec![(0.0, 0.0); places.len()];
-    for place in (first + 1..places.len() - 1).rev() {
-        left[place] = plus(left[place + 1], plus(leg(place - 1), waypoint(place)));
-    }
-    let of_rest = plus(left[first + 1], leg(first - 1));
-    let mut joints: Vec<(f64, f64, usize, usize)> = Vec::new();
-    for (idx, &(from, to)) in ends.iter().enumerate().skip(places.len() - 2) {
-        let (violation, cost) = plus(leg(idx), plus(reached[from], left[to]));
-        if (violation, cost) < of_rest {
-            joints.push((violation, cost, from, to));
+    let with = |sum: Fitness, leg: &Fitness, place: Point3| {
+        let own = model.waypoint(place, tolerance);
+        Fitness {
+            violation: sum.violation + leg.violation + own.0,
+            cost: sum.cost + leg.cost + own.1,
         }
+    };
+    // What it takes to reach each waypoint of the head, and to get to the target from each of the rest.
+    let mut reached = vec![NOTHING; head.len()];
+    for place in 1..head.len() - 1 {
+        reached[place] = with(reached[place - 1], &of_head[place - 1], head[place]);
     }
-    joints.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.total_cmp(&other.1)));
-    let routes = joints
-        .iter()
-        .map(|&(_, _, from, to)| [&head[..=from], &places[to..]].concat());
-    let alike = routes.filter(|route| sides(model, route) == wanted);
-    // Turns decide among the cheapest.
-    let priced = alike.take(CLOSE).map(|route| (price(model, &route), route));
-    let rest = (price(model, rest), rest.to_vec());
-    let best = priced.fold(
-        rest,
-        |best, next| if next.0.beats(&best.0) { next } else { best },
-    );
-    best.1
+    let mut left = vec![NOTHING; rest.len()];
+    for place in (1..rest.len() - 1).rev() {
+        left[place] = with(left[place + 1], &of_rest[place], rest[place]);
+    }
+    let whole = |from: Fitness, leg: &Fitness, to: Fitness| Fitness {
+        violation: from.violation + leg.violation + to.violation,
+        cost: from.cost + leg.cost + to.cost,
+    };
+    let without = whole(NOTHING, &of_rest[0], left[1]);
+    let priced = across.into_iter().zip(legs);
+    let mut joints: Vec<(Fitness, (usize, usize))> = priced
+        .map(|((from, to), leg)| (whole(reached[from], leg, left[to]), (from, to)))
+        .filter(|(fitness, _)| fitness.beats(&without))
+        .collect();
+    joints.sort_by(|(one, _), (other, _)| one.rank(other));
+    joints.into_iter().map(|(_, joint)| joint).collect()
 }
 
 #[cfg(test)]
@@ -165,7 +182,7 @@ mod tests {
         let other = through(&[[265.0, 430.0], [380.0, 400.0], [600.0, 255.0]]);
         let priced = [best.clone(), other.clone()].map(|route| (price(&model, &route), route));
         assert!(priced[0].0.beats(&priced[1].0));
-        let grafts = grafted(&model, &priced).routes;
+        let (grafts, _) = grafted(&model, &priced);
         assert_eq!(grafts.len(), 1);
         let (fitness, graft) = &grafts[0];
         assert!(fitness.is_feasible() && fitness.beats(&priced[1].0));

@@ -125,9 +125,9 @@ fn starts_from(
     if settings.polish {
         let hopeless = if is_known { 0.0 } else { hopeless };
         if !is_known && grafts::are_wanted(model, is_rough) {
-            let grafted = grafts::grafted(model, &priced);
-            evaluations += grafted.legs_priced / (coarse as u64 + 1);
-            grafts = grafted.routes;
+            let (grafted, effort) = grafts::grafted(model, &priced);
+            evaluations += effort.routes + effort.legs / (coarse as u64 + 1);
+            grafts = grafted;
         }
         refine(model, &mut priced, hopeless, stop, &mut evaluations);
         let best = priced.first().map_or(Fitness::WORST, |(best, _)| *best);

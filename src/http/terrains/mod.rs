@@ -4,28 +4,26 @@
 //! threads of their own, few at a time. Where nodes share datasets, all of this may wait for servers, so none of it
 //! takes a place from work that computes.
 
+mod count;
 mod document;
 mod elevations;
 mod receive;
 mod upload;
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use axum::Json;
 use axum::extract::{FromRequestParts, Path, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use parking_lot::Mutex;
 use serde::Serialize;
-use tokio::sync::Semaphore;
-use tokio::time::timeout;
 
 pub(super) use elevations::elevations;
 pub(super) use receive::SLOWEST;
 pub(super) use upload::put;
 
+use count::Count;
 use document::TerrainDocument;
 
 use super::caller::Caller;
@@ -47,8 +45,6 @@ const CHECKS: usize = 2;
 const READS: usize = 4;
 /// Requests that may ask for names and records at the same time.
 const RECORDS: usize = 16;
-/// Who asks for their number waits no longer than this for a count of them.
-const COUNTING: Duration = Duration::from_millis(500);
 
 /// The datasets, and limits on concurrent work with them.
 #[derive(Clone)]
@@ -59,10 +55,7 @@ pub struct Terrains {
     checks: Places,
     reads: Places,
     records: Places,
-    /// What they came to when they were last counted.
-    counted: Arc<Mutex<Tally>>,
-    /// The turn to count them.
-    counting: Arc<Semaphore>,
+    count: Count,
 }
 
 impl Terrains {
@@ -75,8 +68,7 @@ impl Terrains {
             checks: Places::new(CHECKS, Busy::Datasets),
             reads: Places::new(READS, Busy::Datasets),
             records: Places::new(RECORDS, Busy::Datasets),
-            counted: Arc::default(),
-            counting: Arc::new(Semaphore::new(1)),
+            count: Count::new(),
         }
     }
 
@@ -93,20 +85,10 @@ impl Terrains {
         Ok(records.await??)
     }
 
-    /// How many there are; as they were counted last while somebody else counts them, or that takes long. A directory
-    /// that does not answer thus holds one thread and nobody who asks.
+    /// How many there are, or were a while ago, see [`Count::ask`].
     pub(super) async fn tally(&self) -> Tally {
-        if let Ok(turn) = self.counting.clone().try_acquire_owned() {
-            let (catalogue, counted) = (self.catalogue.clone(), self.counted.clone());
-            let count = tokio::task::spawn_blocking(move || {
-                let tally = catalogue.tally();
-                *counted.lock() = tally;
-                drop(turn);
-            });
-            // What takes longer is there for the next who asks.
-            _ = timeout(COUNTING, count).await;
-        }
-        *self.counted.lock()
+        let catalogue = self.catalogue.clone();
+        self.count.ask(move || catalogue.tally()).await
     }
 
     /// Do work that reads from datasets, once few enough others do.

@@ -35,6 +35,12 @@ impl Fitness {
         cost: f64::INFINITY,
     };
 
+    /// Of nothing flown.
+    pub const ZERO: Self = Self {
+        violation: 0.0,
+        cost: 0.0,
+    };
+
     /// The total order of Deb's rule; better is `Less`. What is no number is as bad as what is infinite.
     #[must_use]
     pub fn rank(&self, other: &Self) -> Ordering {

@@ -16,12 +16,6 @@ const MOST: usize = 16;
 /// Of the cheapest joints, so many are looked at with the turns that they make.
 const CLOSE: usize = 8;
 
-/// The price of no way.
-const NOTHING: Fitness = Fitness {
-    violation: 0.0,
-    cost: 0.0,
-};
-
 /// How many legs and routes were priced.
 #[derive(Default)]
 pub(super) struct Effort {
@@ -131,11 +125,11 @@ fn joints(
         }
     };
     // What it takes to reach each waypoint of the head, and to get to the target from each of the rest.
-    let mut reached = vec![NOTHING; head.len()];
+    let mut reached = vec![Fitness::ZERO; head.len()];
     for place in 1..head.len() - 1 {
         reached[place] = with(reached[place - 1], &of_head[place - 1], head[place]);
     }
-    let mut left = vec![NOTHING; rest.len()];
+    let mut left = vec![Fitness::ZERO; rest.len()];
     for place in (1..rest.len() - 1).rev() {
         left[place] = with(left[place + 1], &of_rest[place], rest[place]);
     }
@@ -143,7 +137,7 @@ fn joints(
         violation: from.violation + leg.violation + to.violation,
         cost: from.cost + leg.cost + to.cost,
     };
-    let without = whole(NOTHING, &of_rest[0], left[1]);
+    let without = whole(Fitness::ZERO, &of_rest[0], left[1]);
     let priced = across.into_iter().zip(legs);
     let mut joints: Vec<(Fitness, (usize, usize))> = priced
         .map(|((from, to), leg)| (whole(reached[from], leg, left[to]), (from, to)))

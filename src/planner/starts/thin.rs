@@ -24,12 +24,6 @@ const AT_ONCE: usize = 16;
 /// coarse.
 const FAR_FROM: f64 = 0.02;
 
-/// Nothing flown yet.
-const NOTHING: Fitness = Fitness {
-    violation: 0.0,
-    cost: 0.0,
-};
-
 /// The places of `chain` that make the best route with as many free waypoints as a coarse one may have, and how many
 /// legs were priced to find it. Turns are considered only where those of the best route are too sharp.
 pub(super) fn thin(model: &Model, pricer: &Pricer, chain: &[Point3]) -> (Vec<Point3>, u64) {
@@ -128,7 +122,7 @@ impl<'c> Legs<'c> {
         };
         // The best way to each place, by number of legs.
         let mut ways = vec![vec![(Fitness::WORST, 0); self.chain.len()]];
-        ways[0][0].0 = NOTHING;
+        ways[0][0].0 = Fitness::ZERO;
         let mut legs = 1;
         for count in 1..=self.most {
             let best = self.one_more(&ways[count - 1]);
@@ -172,7 +166,7 @@ impl<'c> Legs<'c> {
     /// The cost of the best way of any number of legs.
     fn of_any_number(&self) -> Fitness {
         let mut best = vec![Fitness::WORST; self.chain.len()];
-        best[0] = NOTHING;
+        best[0] = Fitness::ZERO;
         for (a, legs) in self.worth.iter().enumerate() {
             for (leg, b) in legs.iter().zip(a + 1..) {
                 let way = further(best[a], leg);
@@ -268,10 +262,7 @@ mod tests {
     fn sum_of_legs(model: &Model, route: &[Point3]) -> Fitness {
         let scenario = model.scenario;
         let tolerance = search_tolerance(model);
-        let mut sum = Fitness {
-            violation: 0.0,
-            cost: 0.0,
-        };
+        let mut sum = Fitness::ZERO;
         for ends in route.windows(2) {
             let (violation, cost) =
                 model.leg(ends[0], ends[1], scenario.planner.quadrature, tolerance);

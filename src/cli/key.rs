@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use anyhow::anyhow;
+use anyhow::{anyhow, ensure};
 use clap::{Args, Subcommand};
 use jiff::Timestamp;
 
@@ -53,6 +53,12 @@ fn scope(name: &str) -> Result<Scope, String> {
 
 pub(super) fn run(command: &Command) -> anyhow::Result<()> {
     let Command::New(arguments) = command;
+    if let Some(time) = arguments.expires {
+        ensure!(
+            time > Timestamp::now(),
+            "--expires {time} is past, must be a time to come"
+        );
+    }
     let key = fresh_key()?;
     let entry = entry(arguments, &key);
     Keys::read(&entry).map_err(|error| anyhow!("there can be no such key: {error}"))?;

@@ -91,7 +91,7 @@ fn a_new_key_is_printed_once_and_its_entry_can_be_appended() {
         "--name",
         "b",
         "--expires",
-        "2027-01-31T00:00:00Z",
+        "2127-01-31T00:00:00Z",
         "--requests-per-second",
         "2",
     ];
@@ -104,13 +104,14 @@ fn a_new_key_is_printed_once_and_its_entry_can_be_appended() {
         entries[0]["sha256"].as_str(),
         Some(noctule::digest::sha256_hex(key.as_bytes()).as_str())
     );
-    assert_eq!(entries[1]["expires"].as_str(), Some("2027-01-31T00:00:00Z"));
+    assert_eq!(entries[1]["expires"].as_str(), Some("2127-01-31T00:00:00Z"));
 
     for arguments in [
         &["--name", ""][..],
         &["--name", "a", "--scopes", "write"],
         &["--name", "a", "--burst", "2"],
         &["--name", "a", "--expires", "soon"],
+        &["--name", "a", "--expires", "2020-01-31T00:00:00Z"],
     ] {
         let refused = run(&[&["key", "new"], arguments].concat(), "");
         assert_eq!(refused.status.code(), Some(1), "{arguments:?}");

@@ -35,7 +35,7 @@ pub(super) fn check_apart(start: Point3, target: Point3, faults: &mut Faults) {
         faults.add(&path, "target-above-start", || {
             format!(
                 "target is {} m from start seen from above, must be at least {ABOVE_M} m",
-                metres(horizontal)
+                figure(horizontal)
             )
         });
     }

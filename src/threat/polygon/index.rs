@@ -1,31 +1,27 @@
-//! Spatial index of the edges of a ring with many vertices, so that a query does not visit all of them.
+//! Boxes around runs of consecutive edges of a ring with many vertices, so that a question does not visit all of them.
 //!
-//! Results are the same as without it: only edges that cannot affect a result are skipped.
+//! Results are the same as without it: only edges that cannot affect a result are skipped. Consecutive edges lie together,
+//! so halving their list is a tree as good as any, and answers come in the order of the ring.
 
-use rstar::primitives::{GeomWithData, Rectangle};
-use rstar::{AABB, RTree};
+use std::ops::Range;
 
-use crate::geometry::{Point2, ring};
+use crate::geometry::{Point2, Rect, ring};
 
 /// Rings with fewer vertices are searched linearly.
 const MANY: usize = 64;
 
-/// Added to the extent of a tree query, metres, as a margin for rounding.
+/// Edges in a box that is not divided further.
+const FEW: usize = 4;
+
+/// Added to the reach of a question, metres, as a margin for rounding.
 const HAIR: f64 = 1e-6;
 
-/// The boxes around the edges of a ring.
-#[derive(Debug, Clone)]
-pub(super) struct Index(RTree<Entry>);
+/// A tree of boxes: the whole ring's is number 1, and halves of the edges in box `n` lie in `2 n` and `2 n + 1`.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Index(Vec<Rect>);
 
-/// The box around an edge, and the index of the edge.
-type Entry = GeomWithData<Rectangle<[f64; 2]>, usize>;
-
-/// Two indexes compare equal: they are derived from the ring, which is compared itself.
-impl PartialEq for Index {
-    fn eq(&self, _: &Self) -> bool {
-        true
-    }
-}
+/// A box, and the edges in it.
+type Run = (usize, Range<usize>);
 
 impl Index {
     /// The index of the ring through `vertices`; `None` if they are too few for it to pay off.
@@ -33,60 +29,143 @@ impl Index {
         if vertices.len() < MANY {
             return None;
         }
-        let entries = ring::edges(vertices).enumerate().map(|(idx, (a, b))| {
-            GeomWithData::new(Rectangle::from_corners([a.x, a.y], [b.x, b.y]), idx)
-        });
-        Some(Self(RTree::bulk_load(entries.collect())))
+        let nowhere = Rect {
+            min: vertices[0],
+            max: vertices[0],
+        };
+        let mut boxes = vec![nowhere; 2 * vertices.len().div_ceil(FEW).next_power_of_two()];
+        fill(&mut boxes, vertices, (1, 0..vertices.len()));
+        Some(Self(boxes))
     }
 
     /// The edges, in order, that come within `reach` metres of the box around `a` and `b`, and possibly others.
-    pub(super) fn near(&self, a: Point2, b: Point2, reach: f64) -> Vec<usize> {
-        let reach = reach + HAIR;
-        let (low, high) = (a.inf(&b), a.sup(&b));
-        let mut edges = self.between(
-            [low.x - reach, low.y - reach],
-            [high.x + reach, high.y + reach],
-        );
-        edges.sort_unstable();
-        edges
+    pub(super) fn near(&self, vertices: &[Point2], a: Point2, b: Point2, reach: f64) -> Vec<usize> {
+        let asked = Rect {
+            min: a.inf(&b),
+            max: a.sup(&b),
+        };
+        let (asked, mut found) = (asked.grown(reach + HAIR), Vec::new());
+        self.collect((1, 0..vertices.len()), vertices, &asked, &mut found);
+        found
     }
 
-    /// As [`ring::contains`]: only edges at the height of `point` and to its right can be crossed.
+    fn collect(&self, run: Run, vertices: &[Point2], asked: &Rect, found: &mut Vec<usize>) {
+        if !self.0[run.0].meets(asked) {
+            return;
+        }
+        if let Some(halves) = halves(&run) {
+            for half in halves {
+                self.collect(half, vertices, asked, found);
+            }
+        } else {
+            found.extend(run.1.filter(|&edge| around(vertices, edge).meets(asked)));
+        }
+    }
+
+    /// As [`ring::contains`].
     pub(super) fn contains(&self, vertices: &[Point2], point: Point2) -> bool {
-        let right = self.0.root().envelope().upper()[0].max(point.x);
-        let edges = self.between([point.x - HAIR, point.y], [right + HAIR, point.y]);
-        let crossed = edges
-            .into_iter()
-            .filter(|edge| ring::is_crossed(edge_of(vertices, *edge), point));
-        crossed.count() % 2 == 1
+        self.is_crossed((1, 0..vertices.len()), vertices, point)
+    }
+
+    /// Whether the ray from `point` to the right crosses an odd number of the edges of `run`.
+    fn is_crossed(&self, run: Run, vertices: &[Point2], point: Point2) -> bool {
+        let of = &self.0[run.0];
+        let is_level = of.min.y <= point.y && point.y <= of.max.y;
+        if !is_level || of.max.x < point.x - HAIR {
+            return false;
+        }
+        if of.min.x > point.x + HAIR {
+            // All of it lies to the right, so only on which side of the ray it begins and ends matters.
+            let ends = [run.1.start, run.1.end % vertices.len()];
+            let [begins_above, ends_above] = ends.map(|end| vertices[end].y > point.y);
+            return begins_above != ends_above;
+        }
+        match halves(&run) {
+            Some([one, other]) => {
+                self.is_crossed(one, vertices, point) != self.is_crossed(other, vertices, point)
+            }
+            None => {
+                let edges = run.1.map(|edge| edge_of(vertices, edge));
+                edges.filter(|edge| ring::is_crossed(*edge, point)).count() % 2 == 1
+            }
+        }
     }
 
     /// As [`ring::distance`]: edges whose boxes are farther away than a known edge cannot be nearest.
     pub(super) fn distance(&self, vertices: &[Point2], point: Point2) -> f64 {
-        let mut least = f64::INFINITY;
-        for (entry, away) in self
-            .0
-            .nearest_neighbor_iter_with_distance_2([point.x, point.y])
-        {
-            if away.sqrt() > least.sqrt() + HAIR {
-                break;
-            }
-            least = least.min(ring::squared_distance(edge_of(vertices, entry.data), point));
-        }
-        least.sqrt()
+        let mut squared = f64::INFINITY;
+        self.approach((1, 0..vertices.len()), vertices, point, &mut squared);
+        squared.sqrt()
     }
 
-    /// The edges whose boxes intersect a box.
-    fn between(&self, low: [f64; 2], high: [f64; 2]) -> Vec<usize> {
-        self.0
-            .locate_in_envelope_intersecting(AABB::from_corners(low, high))
-            .map(|entry| entry.data)
-            .collect()
+    fn approach(&self, run: Run, vertices: &[Point2], point: Point2, squared: &mut f64) {
+        if let Some(mut halves) = halves(&run) {
+            let mut away = [0, 1].map(|half| self.0[halves[half].0].excess(point));
+            if away[1] < away[0] {
+                halves.reverse();
+                away.reverse();
+            }
+            for (half, away) in halves.into_iter().zip(away) {
+                if away <= squared.sqrt() + HAIR {
+                    self.approach(half, vertices, point, squared);
+                }
+            }
+        } else {
+            for edge in run.1 {
+                *squared = squared.min(ring::squared_distance(edge_of(vertices, edge), point));
+            }
+        }
     }
 }
 
+/// Set the box of `run` and those within it.
+fn fill(boxes: &mut [Rect], vertices: &[Point2], run: Run) {
+    let number = run.0;
+    boxes[number] = match halves(&run) {
+        Some(halves) => {
+            let [one, other] = halves.map(|half| {
+                let number = half.0;
+                fill(boxes, vertices, half);
+                boxes[number]
+            });
+            Rect {
+                min: one.min.inf(&other.min),
+                max: one.max.sup(&other.max),
+            }
+        }
+        None => {
+            let corners = run
+                .1
+                .flat_map(|edge| <[Point2; 2]>::from(edge_of(vertices, edge)));
+            Rect::around(corners).expect("a run has edges")
+        }
+    };
+}
+
+/// The halves of a run, unless it has only a few edges.
+fn halves((number, edges): &Run) -> Option<[Run; 2]> {
+    let middle = edges.start + edges.len() / 2;
+    (edges.len() > FEW).then_some([
+        (2 * number, edges.start..middle),
+        (2 * number + 1, middle..edges.end),
+    ])
+}
+
 fn edge_of(vertices: &[Point2], edge: usize) -> (Point2, Point2) {
-    (vertices[edge], vertices[(edge + 1) % vertices.len()])
+    let next = if edge + 1 == vertices.len() {
+        0
+    } else {
+        edge + 1
+    };
+    (vertices[edge], vertices[next])
+}
+
+fn around(vertices: &[Point2], edge: usize) -> Rect {
+    let (a, b) = edge_of(vertices, edge);
+    Rect {
+        min: a.inf(&b),
+        max: a.sup(&b),
+    }
 }
 
 #[cfg(test)]
@@ -94,6 +173,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::geometry::Vector2;
 
     /// A star, partly far from the origin, whose vertices lie on a lattice, so that points beside them are common.
     fn star(corners: &[f64], offset: f64) -> Vec<Point2> {
@@ -125,6 +205,10 @@ mod tests {
                 prop_assert_eq!(index.contains(&vertices, point), ring::contains(&vertices, point), "{}", point);
                 let (found, expected) = (index.distance(&vertices, point), ring::distance(&vertices, point));
                 prop_assert_eq!(found.to_bits(), expected.to_bits(), "{}", point);
+                let (other, reach) = (point + Vector2::new(40.0, -7.0), 3.0);
+                let asked = Rect { min: point.inf(&other), max: point.sup(&other) }.grown(reach + HAIR);
+                let expected: Vec<usize> = (0..vertices.len()).filter(|&edge| around(&vertices, edge).meets(&asked)).collect();
+                prop_assert_eq!(index.near(&vertices, point, other, reach), expected, "{}", point);
             }
         }
     }

@@ -17,7 +17,7 @@ pub(crate) use zones::{HAIR, Zone};
 
 use cells::Cells;
 use index::Index;
-use nearest::{Edge, Feature, Kind, Piece, cut};
+use nearest::{Crossing, Edge, Feature, Kind, Piece, cut};
 
 /// A point nearer to a ring than this lies on it, metres.
 const ON_THE_RING: f64 = 1e-6;
@@ -174,14 +174,11 @@ impl Polygon {
         let edges = self.edges_near(leg, window, self.margin);
         let near = edges.iter().map(|&edge| &self.edges[edge]);
         let near = nearest::features_near(near, leg, window, 0.0);
-        // Inside and outside are not decided by the nearest feature: where edges are nearly in line, rounding may
-        // pick the wrong one beside a vertex, and miss the crossing.
-        let crossings = nearest::crossings(&near, window);
         let length = leg.horizontal_length();
         let is_exposed = self.margin > 0.0 && length >= LEVEL && !edges.is_empty();
-        let (mut depth, mut exposure, mut from) = (0.0_f64, 0.0, window.0);
-        for to in crossings.into_iter().chain([window.1]) {
-            if self.contains(leg.at(0.5 * (from + to)).xy()) {
+        let (mut depth, mut exposure) = (0.0_f64, 0.0);
+        for ((from, to), is_inside) in self.sides(leg, &near, window) {
+            if is_inside {
                 depth = depth.max(self.depth(leg, (from, to)));
                 exposure += self.margin * (to - from) * leg.length();
             } else if is_exposed && to > from {
@@ -189,14 +186,13 @@ impl Polygon {
                 let edges = if (from, to) == window {
                     &edges
                 } else {
-                    near = self.edges_near(leg, (from, to), self.margin);
+                    near = self.edges_near(leg, (from, to), self.farthest(leg, (from, to), window));
                     &near
                 };
                 exposure += self
                     .exposure_outside(edges, leg, (from, to))
-                    .unwrap_or_else(|| self.exposure_among(leg, (from, to)));
+                    .unwrap_or_else(|| self.exposure_among(edges, leg, (from, to)));
             }
-            from = to;
         }
         if length < LEVEL && self.margin > 0.0 {
             exposure = hover_exposure(leg, window, |point| self.intensity(point));
@@ -204,9 +200,51 @@ impl Polygon {
         (depth, exposure)
     }
 
-    /// Exposure of the part `part` of `leg`, which is outside the ring.
-    fn exposure_among(&self, leg: &Segment, part: (f64, f64)) -> f64 {
-        let features = self.features_near(leg, part, self.margin);
+    /// The parts of the part `window` of `leg` between its crossings of the edges among `near`, in order, and whether each
+    /// is inside.
+    fn sides(
+        &self,
+        leg: &Segment,
+        near: &[Feature],
+        window: (f64, f64),
+    ) -> Vec<((f64, f64), bool)> {
+        // Inside and outside are not decided by the nearest feature: where edges are nearly in line, rounding may
+        // pick the wrong one beside a vertex, and miss the crossing.
+        let end = Crossing {
+            t: window.1,
+            is_sure: false,
+        };
+        let (mut from, mut known) = (window.0, None);
+        let side = |Crossing { t, is_sure }: Crossing| {
+            let part = (std::mem::replace(&mut from, t), t);
+            let middle = || leg.at(0.5 * (part.0 + part.1)).xy();
+            let is_inside = known.unwrap_or_else(|| self.contains(middle()));
+            // To ask the whole ring again takes long where a leg crosses hundreds of edges.
+            known = is_sure.then_some(!is_inside);
+            (part, is_inside)
+        };
+        let crossings = nearest::crossings(near, window);
+        crossings.into_iter().chain([end]).map(side).collect()
+    }
+
+    /// No point of the part `(from, to)` of `leg` is farther from the ring, metres, or it is outside the soft zone: within
+    /// `window`, parts end where the leg crosses the ring.
+    fn farthest(&self, leg: &Segment, (from, to): (f64, f64), window: (f64, f64)) -> f64 {
+        let way = (to - from) * leg.horizontal_length();
+        let crossed = [from > window.0, to < window.1];
+        let from_ring = match crossed {
+            [true, true] => 0.5 * way,
+            [false, false] => f64::INFINITY,
+            _ => way,
+        };
+        self.margin
+            .min(from_ring + HAIR + 1e-8 * leg.horizontal_length())
+    }
+
+    /// Exposure of the part `part` of `leg`, which is outside the ring and has these `edges` near it.
+    fn exposure_among(&self, edges: &[usize], leg: &Segment, part: (f64, f64)) -> f64 {
+        let near = edges.iter().map(|&edge| &self.edges[edge]);
+        let features = nearest::features_near(near, leg, part, self.margin);
         let mut exposure = 0.0;
         if !features.is_empty() {
             let length = leg.horizontal_length();
@@ -226,7 +264,7 @@ impl Polygon {
     /// The edges, in order, that come within `reach` metres of the box around two points, and possibly others.
     fn edges_beside(&self, from: Point2, to: Point2, reach: f64) -> Vec<usize> {
         if let Some(index) = &self.index {
-            return index.near(from, to, reach);
+            return index.near(&self.vertices, from, to, reach);
         }
         let (low, high, reach) = (from.inf(&to), from.sup(&to), reach + HAIR);
         let off =

@@ -201,21 +201,48 @@ impl Piece {
     }
 }
 
+/// Where a leg crosses an edge.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossing {
+    pub(super) t: f64,
+    /// Whether the leg certainly gets from one side of the ring to the other there: rounding would have to move it
+    /// farther than [`DOUBT`] to miss the edge, or to change places with what comes before or after.
+    pub(super) is_sure: bool,
+}
+
+/// Rounding moves a crossing by less than this across the edge, metres.
+const DOUBT: f64 = 1e-7;
+
 /// Where in `window` the leg crosses edges, in order; an edge counts as slightly longer than it is.
-pub(super) fn crossings(features: &[Feature], window: (f64, f64)) -> Vec<f64> {
-    let mut crossings: Vec<f64> = features
+pub(super) fn crossings(features: &[Feature], window: (f64, f64)) -> Vec<Crossing> {
+    // With the distance to the nearer end of the edge, and what rounding may make of both.
+    let mut crossings: Vec<(f64, f64, f64)> = features
         .iter()
         .filter_map(|feature| match feature.kind {
             Kind::Edge { at_start, gain } => {
                 let (t, (from, to)) = (-at_start / gain, feature.valid);
-                (t >= from - NO_TIME && t <= to + NO_TIME).then_some(t)
+                let doubt = 10.0 * NO_TIME + DOUBT / gain.abs();
+                let room = (t - from).min(to - t);
+                (room >= -NO_TIME).then_some((t, room, doubt))
             }
             Kind::Vertex(_) => None,
         })
-        .filter(|&t| t > window.0 && t < window.1)
+        .filter(|&(t, ..)| t > window.0 && t < window.1)
         .collect();
-    crossings.sort_by(f64::total_cmp);
-    crossings
+    crossings.sort_by(|(one, ..), (other, ..)| one.total_cmp(other));
+    let apart = |idx: usize| {
+        let ends = (crossings[idx].0 - window.0).min(window.1 - crossings[idx].0);
+        let from =
+            |other: usize| (crossings[idx].0 - crossings[other].0).abs() - crossings[other].2;
+        let before = idx.checked_sub(1).map_or(f64::INFINITY, from);
+        let after = (idx + 1 < crossings.len()).then(|| from(idx + 1));
+        ends.min(before).min(after.unwrap_or(f64::INFINITY))
+    };
+    let crossing = |(idx, &(t, room, doubt)): (usize, &(f64, f64, f64))| Crossing {
+        t,
+        is_sure: room.is_finite() && room.min(apart(idx)) > doubt,
+    };
+    crossings.iter().enumerate().map(crossing).collect()
 }
 
 /// The pieces of `window` of a leg of horizontal `length`, in order: the feature nearest to its middle is nearest on

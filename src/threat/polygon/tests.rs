@@ -54,13 +54,9 @@ fn parts(ring: &Polygon, leg: &Segment, window: (f64, f64)) -> Vec<Part> {
     let crossings = nearest::crossings(&features, window);
     let (length, mut parts) = (leg.horizontal_length(), Vec::new());
     cut(&features, window, length, &|_| true, &mut |piece| {
-        let within = crossings.iter().filter(|&&t| piece.t0 < t && t < piece.t1);
-        let ends = [
-            &[piece.t0][..],
-            &within.copied().collect::<Vec<_>>(),
-            &[piece.t1],
-        ]
-        .concat();
+        let crossings = crossings.iter().map(|crossing| crossing.t);
+        let within = crossings.filter(|&t| piece.t0 < t && t < piece.t1);
+        let ends = [&[piece.t0][..], &within.collect::<Vec<_>>(), &[piece.t1]].concat();
         for ends in ends.windows(2) {
             let [t0, t1] = [ends[0], ends[1]];
             let inside = ring.contains(leg.at(0.5 * (t0 + t1)).xy());
@@ -400,6 +396,36 @@ proptest! {
             // Along an edge, pieces tell the sides apart to a fraction of the leg.
             prop_assert!((depth - deepest).abs() < 1e-6, "{depth} {deepest}");
             prop_assert!((exposure - sum).abs() <= 1e-8 * (1.0 + sum), "{exposure} {sum}");
+        }
+    }
+
+    /// On which side of the ring a leg is after it has crossed, touched or followed edges is what the whole ring says: a
+    /// saw on a lattice.
+    #[test]
+    fn sides_are_told_apart_at_corners_and_along_edges(
+        heights in prop::collection::vec(1..6_i32, 8..90), turn in prop_oneof![Just(0.0), Just(0.4)],
+        from in (-4..94_i32, -4..9_i32), way in (-60..60_i32, -6..6_i32),
+    ) {
+        let (sin, cos) = libm::sincos(turn);
+        let at = |x: i32, y: i32| {
+            let (x, y) = (f64::from(x), f64::from(y));
+            Point2::new(x * cos - y * sin, x * sin + y * cos)
+        };
+        let teeth = heights.iter().zip(0..).map(|(height, idx)| at(idx, *height));
+        let count = i32::try_from(heights.len()).expect("few teeth");
+        let saw = Polygon::new(teeth.chain([at(count - 1, -2), at(0, -2)]).collect(), 1.0);
+        let [a, b] = [at(from.0, from.1), at(from.0 + way.0, from.1 + way.1)];
+        let leg = leg([a.x, a.y, 0.0], [b.x, b.y, 3.0]);
+        let sides = saw.sides(&leg, &saw.features(&leg, (0.0, 1.0)), (0.0, 1.0));
+        prop_assert!(sides[0].0.0 <= 0.0 && sides[sides.len() - 1].0.1 >= 1.0);
+        for pair in sides.windows(2) {
+            prop_assert!((pair[0].0.1 - pair[1].0.0).abs() <= 0.0);
+        }
+        for ((from, to), is_inside) in sides {
+            let middle = leg.at(0.5 * (from + to)).xy();
+            if to - from > 1e-6 && saw.ring_distance(middle) > 1e-6 {
+                prop_assert_eq!(is_inside, saw.contains(middle), "{}", middle);
+            }
         }
     }
 

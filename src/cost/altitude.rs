@@ -15,8 +15,6 @@ impl Model<'_> {
 
     /// The share of one waypoint, above `ground`.
     pub(super) fn off_middle(&self, point: Point3, ground: f64) -> f64 {
-        let band = self.scenario.altitude;
-        let middle = 0.5 * (band.max + band.min);
-        (point.z - ground - middle).abs()
+        (point.z - ground - self.scenario.altitude.middle()).abs()
     }
 }

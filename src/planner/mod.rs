@@ -219,7 +219,7 @@ pub fn smoothed(scenario: &Scenario, route: &[Point3]) -> Option<Path> {
 const SAME: f64 = 0.02;
 
 fn same(scenario: &Scenario, one: &[Point3], other: &[Point3]) -> bool {
-    let reach = SAME * (scenario.target - scenario.start).norm();
+    let reach = SAME * scenario.direct();
     one.len() == other.len()
         && one
             .iter()

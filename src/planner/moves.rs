@@ -26,7 +26,7 @@ impl<'s> Moves<'s> {
         let coded = |end: Point3| [end.x, end.y, end.z - scenario.terrain.elevation(end.xy())];
         Self {
             model: model.clone(),
-            way: (scenario.target - scenario.start).norm(),
+            way: scenario.direct(),
             start: coded(scenario.start),
             target: coded(scenario.target),
         }
@@ -104,8 +104,7 @@ impl<'s> Moves<'s> {
         let height = if random.unit() < 0.5 {
             between(2)
         } else {
-            let band = self.model.scenario.altitude;
-            0.5 * (band.min + band.max)
+            self.model.scenario.altitude.middle()
         };
         route[into] = self.within([between(0) - dy * aside, between(1) + dx * aside, height]);
     }

@@ -171,7 +171,7 @@ mod tests {
     fn a_descent_in_circles_is_searched_with_other_numbers_of_waypoints() {
         let mut scenario = descent(&[[200.0, 500.0, 401.0, 138.0, 138.0]], 1.0);
         scenario.vehicle.max_climb_deg = 20.0;
-        scenario.vehicle.min_leg = (scenario.target - scenario.start).norm() / 170.0;
+        scenario.vehicle.min_leg = scenario.direct() / 170.0;
         scenario.planner.seed = 2;
         let outcome = plan(&scenario, &mut Nobody, &Nobody);
         assert!(outcome.feasible && circles(&outcome.waypoints));

@@ -46,6 +46,14 @@ pub struct Scenario {
     pub planner: PlannerSettings,
 }
 
+impl Scenario {
+    /// The straight way from the start to the target, metres.
+    #[must_use]
+    pub fn direct(&self) -> f64 {
+        (self.target - self.start).norm()
+    }
+}
+
 /// Allowed heights above ground, metres; `0 <= min < max`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AltitudeBand {
@@ -53,6 +61,15 @@ pub struct AltitudeBand {
     pub min: f64,
     /// Highest, `h_max`.
     pub max: f64,
+}
+
+impl AltitudeBand {
+    /// Where a waypoint costs nothing, Eq. 6.
+    #[inline]
+    #[must_use]
+    pub fn middle(&self) -> f64 {
+        0.5 * (self.min + self.max)
+    }
 }
 
 /// Limits and consumption of the aircraft.

@@ -76,7 +76,7 @@ fn simpler_threat(scenario: &Scenario, idx: usize, threat: &Threat, side: Side) 
         Side::Within => WITHIN,
     };
     let ends = [scenario.start, scenario.target].map(|end| end.xy());
-    let direct = (scenario.target - scenario.start).norm();
+    let direct = scenario.direct();
     let reach = threat.extent().grown(off.coarse * direct / NARROWER);
     let others = scenario.threats.iter().enumerate();
     let near: Vec<&Threat> = others

@@ -248,7 +248,7 @@ fn priced(scenario: &Scenario, batch: usize, time_ms: u32) -> f64 {
     let route = planner::plan(&short, &mut Nobody, &Nobody).waypoints;
     let mut rows: Vec<PointRow> = route.iter().copied().map(PointRow::splat).collect();
     let mut random = Random::new(scenario.planner.seed);
-    let reach = NEIGHBOURHOOD * (scenario.target - scenario.start).norm();
+    let reach = NEIGHBOURHOOD * scenario.direct();
     for (row, point) in rows.iter_mut().zip(&route).skip(1).take(route.len() - 2) {
         for lane in 1..LANES {
             let mut beside = *point;

@@ -287,9 +287,7 @@ impl Pricer<'_> {
     /// How far the end of each leg, above `ground`, lies from the middle of the band, Eq. 6.
     #[inline(always)]
     pub(super) fn off_middle<S: Simd>(&self, leg: &Leg<S>, ground: Lane<S>) -> Lane<S> {
-        let band = self.model.scenario.altitude;
-        let middle = 0.5 * (band.max + band.min);
-        (leg.b.z - ground - middle).abs()
+        (leg.b.z - ground - self.model.scenario.altitude.middle()).abs()
     }
 
     /// Where each leg lies in a terminal zone.

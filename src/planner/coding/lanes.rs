@@ -42,7 +42,7 @@ fn chain<S: Simd>(
     let band = coding.scenario.altitude;
     let zero = Lane::splat(simd, 0.0);
     let (lowest, highest) = (zero.with(band.min), zero.with(band.max));
-    let middle = zero.with(0.5 * (band.min + band.max));
+    let middle = zero.with(band.middle());
     let (mut x, mut y, mut heading) = (zero, zero, zero);
     let mut height = zero.with(coding.start_height);
     let last = points.len() - 1;

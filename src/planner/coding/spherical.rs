@@ -78,7 +78,7 @@ impl<'s> Spherical<'s> {
         route.push(start);
         let (mut x, mut y, mut height, mut heading) = (0.0, 0.0, self.start_height, 0.0);
         let band = self.scenario.altitude;
-        let middle = 0.5 * (band.min + band.max);
+        let middle = band.middle();
         for vector in position.chunks_exact(PER_LEG) {
             let &[amplitude, turn, polar] = vector else {
                 unreachable!("chunks are of PER_LEG numbers")

@@ -74,7 +74,7 @@ impl<'m, 's> Limits<'m, 's> {
     pub(super) fn of(model: &'m Model<'s>, waypoints: usize) -> Self {
         let scenario = model.scenario;
         let vehicle = &scenario.vehicle;
-        let way = (scenario.target - scenario.start).norm();
+        let way = scenario.direct();
         Self {
             model,
             steepest: steepest(scenario),

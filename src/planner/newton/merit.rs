@@ -152,7 +152,7 @@ impl Newton<'_, '_> {
     /// How far a waypoint is above the middle of the band, and what a metre of that costs.
     fn off(&self, place: &Place) -> [f64; 2] {
         let scenario = self.model.scenario;
-        let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max);
+        let middle = scenario.altitude.middle();
         [place.at.z - middle, scenario.weights.altitude]
     }
 }

@@ -274,7 +274,7 @@ impl<'m, 's> Newton<'m, 's> {
     }
 
     fn way(&self) -> f64 {
-        (self.model.scenario.target - self.model.scenario.start).norm()
+        self.model.scenario.direct()
     }
 
     fn places(&self, route: &[Point3]) -> Vec<Place> {
@@ -307,7 +307,7 @@ impl<'m, 's> Newton<'m, 's> {
 /// Whether the limits of turning and climbing influence the shape of `route`.
 pub(super) fn is_felt(model: &Model, route: &[Point3]) -> bool {
     let limits = Limits::of(model, route.len() - 2);
-    let way = (model.scenario.target - model.scenario.start).norm();
+    let way = model.scenario.direct();
     let reach = -FELT * way / (route.len() - 1) as f64;
     limits::all(route.len()).into_iter().any(|limit| {
         // Neither needs heights above ground.

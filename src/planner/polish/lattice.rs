@@ -167,7 +167,7 @@ impl<'m, 's> Lattice<'m, 's> {
     fn waypoint(&self, own: Point3, free: usize, step: f64, turn: usize) -> Waypoint {
         let scenario = self.model.scenario;
         let band = scenario.altitude;
-        let middle = 0.5 * (band.min + band.max);
+        let middle = band.middle();
         let below = scenario.terrain.elevation(own.xy());
         let height = own.z - below;
         let mut waypoint = Waypoint {

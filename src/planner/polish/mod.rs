@@ -76,7 +76,7 @@ impl<'m, 's> Polish<'m, 's> {
         known: &[(Fitness, Vec<Point3>)],
     ) -> Option<Fitness> {
         let scenario = self.model.scenario;
-        let way = (scenario.target - scenario.start).norm();
+        let way = scenario.direct();
         let mut best = self.lattice.price(route);
         let mut rate = steps.violation_m * metre(scenario);
         let (mut step, mut kind, mut gained, mut failed) = (steps.from * way, 0, 0, 0);

@@ -15,7 +15,7 @@ pub(super) fn detour(model: &Model, route: &[Point3]) -> Option<f64> {
     let scenario = model.scenario;
     let figures = model.figures(route, scenario.planner.quadrature);
     let way = figures.fuel + figures.threat;
-    let direct = (scenario.target - scenario.start).norm() * metre(scenario);
+    let direct = scenario.direct() * metre(scenario);
     (figures.threat > MUCH * way).then(|| (way / direct).min(FARTHEST))
 }
 

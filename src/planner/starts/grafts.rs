@@ -189,7 +189,7 @@ mod tests {
         let mut scenario = scenario();
         scenario.threats = vec![disc([500.0, 480.0, 60.0, 90.0])];
         let wanted = |scenario: &_, is_rough| are_wanted(&Model::new(scenario), is_rough);
-        scenario.start.z = 0.5 * (scenario.altitude.min + scenario.altitude.max);
+        scenario.start.z = scenario.altitude.middle();
         scenario.target.z = scenario.start.z;
         assert!(!wanted(&scenario, false) && wanted(&scenario, true));
         let mut low = scenario.clone();

@@ -50,7 +50,7 @@ impl<'p, 's> Legs<'p, 's> {
         let tolerance = search_tolerance(model);
         let pricer = pricer(model).verdicts();
         let count = places.len();
-        let worth = WORTH * (scenario.target - scenario.start).norm() * metre(scenario);
+        let worth = WORTH * scenario.direct() * metre(scenario);
         // Half the cost of either end as a waypoint; the ends of the route cost nothing.
         let mut own: Vec<f64> = places
             .iter()
@@ -208,7 +208,7 @@ fn worthwhile(
     places: &[Point3],
     known: f64,
 ) -> impl Iterator<Item = Vec<(usize, usize)>> {
-    let direct = (scenario.target - scenario.start).norm();
+    let direct = scenario.direct();
     let away = [scenario.start, scenario.target]
         .map(|end| -> Vec<f64> { places.iter().map(|place| (place - end).norm()).collect() });
     let ways = away[0].iter().zip(&away[1]).map(|(one, other)| one + other);

@@ -58,7 +58,7 @@ pub(super) fn over(scenario: &Scenario, spot: Point2, reach: f64) -> Vec<Point3>
 /// Places around start and target from which, or up to which, the way is in the middle of the band: those that one leg
 /// reaches as steeply as the vehicle can climb, if that is farther than `least`.
 pub(super) fn about_ends(scenario: &Scenario, least: f64) -> Vec<Point3> {
-    let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max);
+    let middle = scenario.altitude.middle();
     let mut places = Vec::new();
     for end in [scenario.start, scenario.target] {
         let ground = scenario.terrain.elevation(end.xy());

@@ -152,7 +152,7 @@ pub(super) fn different<P: Copy + Ord>(
     let mut chains: Vec<Vec<Point3>> = Vec::new();
     // First those that take an entirely different way.
     for (count, reach) in [(count / 2, APART), (count, NEAR)] {
-        let reach = reach * (model.scenario.target - model.scenario.start).norm();
+        let reach = reach * model.scenario.direct();
         // Most chains lead over places that others lead over.
         let mut is_near: Vec<Vec<Option<bool>>> = vec![vec![None; places.len()]; chains.len()];
         for &(_, point) in &over {
@@ -177,7 +177,7 @@ pub(super) fn different<P: Copy + Ord>(
 
 /// Whether every waypoint of `chain` lies within `reach`, a share of the direct way, of a leg of `other`.
 pub(super) fn is_near(model: &Model, chain: &[Point3], other: &[Point3], reach: f64) -> bool {
-    let reach = reach * (model.scenario.target - model.scenario.start).norm();
+    let reach = reach * model.scenario.direct();
     let mut points = chain.iter();
     points.all(|point| is_point_near(*point, other, reach))
 }

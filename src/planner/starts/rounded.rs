@@ -11,8 +11,7 @@ const SHORT: f64 = 0.004;
 /// allowed.
 pub(super) fn rounded(scenario: &Scenario, chain: &[Point3]) -> Option<Vec<Point3>> {
     let most = scenario.vehicle.max_turn() * (1.0 - 1e-6);
-    let short = (SHORT * (scenario.target - scenario.start).norm())
-        .max(scenario.vehicle.min_leg * (1.0 + 1e-6));
+    let short = (SHORT * scenario.direct()).max(scenario.vehicle.min_leg * (1.0 + 1e-6));
     let mut route = vec![chain[0]];
     for corner in chain.windows(3) {
         route.push(corner[1]);

@@ -117,7 +117,7 @@ fn raised(model: &Model, (a, b): (Point3, Point3), way: &[(f64, bool)]) -> (Fitn
 
 /// Maximum cost of a waypoint that is put on its leg without looking further.
 fn dear(model: &Model) -> f64 {
-    let way = (model.scenario.target - model.scenario.start).norm();
+    let way = model.scenario.direct();
     DEAR * way * metre(model.scenario)
 }
 
@@ -134,7 +134,7 @@ impl Split {
     fn of(model: &Model, a: Point3, b: Point3) -> Self {
         let tolerance = search_tolerance(model);
         let length = (b - a).norm();
-        let way = (model.scenario.target - model.scenario.start).norm();
+        let way = model.scenario.direct();
         let apart = model.scenario.vehicle.min_leg.max(APART * way);
         let least = (apart / length * (1.0 + 1e-6)).min(0.5);
         let at = |share: f64| {

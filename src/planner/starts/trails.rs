@@ -132,7 +132,7 @@ impl<'s> Net<'s> {
             }
         }
         // A route has one waypoint per certain distance, not one at every place.
-        let way = (scenario.target - scenario.start).norm();
+        let way = scenario.direct();
         let waypoints = (scenario.planner.waypoints + 1) as f64 / way;
         let own: Vec<f64> = places
             .iter()

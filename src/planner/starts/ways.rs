@@ -55,9 +55,8 @@ pub(super) fn sought(
 pub(super) fn routes(model: &Model, sought: WaysSought, is_over: &dyn Fn() -> bool) -> Found {
     let scenario = model.scenario;
     let pricer = pricer(model).verdicts();
-    let band = scenario.altitude;
     let ground = scenario.terrain.elevation(scenario.start.xy());
-    let height = ground + 0.5 * (band.min + band.max);
+    let height = ground + scenario.altitude.middle();
     let mut found = Found::default();
     for way in cheap_ways(scenario, height, sought) {
         if is_over() {
@@ -156,7 +155,7 @@ mod tests {
         scenario.threats = vec![radar(400.0, 500.0, 60.0), radar(700.0, 500.0, 60.0)];
         assert_eq!(of(&scenario, 1e6), None);
         scenario.threats = vec![radar(415.0, 500.0, 60.0), radar(585.0, 500.0, 60.0)];
-        let direct = 0.5 * (scenario.target - scenario.start).norm();
+        let direct = 0.5 * scenario.direct();
         let sought = of(&scenario, 2.0 * direct).expect("through the gap is not dearer");
         assert_eq!(sought.most, AMONG_FEW.most);
         assert!(sought.dearest < 2.3 * direct);

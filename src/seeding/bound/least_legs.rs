@@ -60,7 +60,7 @@ mod tests {
     /// metre off it, with legs of at least 40 m and climbs of at most 30 degrees.
     fn least(weight: f64, waypoints: usize) -> f64 {
         let mut scenario = scenario(r#""threats": []"#);
-        let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max);
+        let middle = scenario.altitude.middle();
         (scenario.start.z, scenario.target.z) = (middle - 70.0, middle + 30.0);
         (scenario.vehicle.min_leg, scenario.vehicle.max_climb_deg) = (40.0, 30.0);
         scenario.planner.waypoints = waypoints;

@@ -28,7 +28,7 @@ impl Middle {
             1e-9 * (1.0 + low.abs())
         };
         let lowest = low - hair;
-        let middle = lowest + 0.5 * (scenario.altitude.min + scenario.altitude.max);
+        let middle = lowest + scenario.altitude.middle();
         Self {
             below: [scenario.start, scenario.target].map(|end| middle - end.z),
             is_level,

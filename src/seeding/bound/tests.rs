@@ -214,7 +214,7 @@ fn the_bound_never_exceeds_a_way_through_negligible_obstacles() {
         scenario.weights.fuel = fuel;
         scenario.weights.threat = threat;
         scenario.weights.altitude = 0.0;
-        let straight = fuel * (scenario.target - scenario.start).norm();
+        let straight = fuel * scenario.direct();
         let bound = lower_bound(&scenario);
         assert!(bound <= straight, "{bound} {straight}");
     };
@@ -271,7 +271,7 @@ fn a_stop_is_noticed_while_gaps_are_examined() {
 #[test]
 fn the_bound_is_never_below_the_straight_line() {
     let scenario = scenario(r#""threats": []"#);
-    let straight = 0.5 * (scenario.target - scenario.start).norm();
+    let straight = 0.5 * scenario.direct();
     assert!(lower_bound(&scenario) >= straight * (1.0 - 1e-8));
 }
 

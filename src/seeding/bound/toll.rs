@@ -100,7 +100,7 @@ impl Heights {
     pub(super) fn toll(&self, threat: &Threat, scenario: &Scenario) -> Option<Toll> {
         let (start, target) = (scenario.start.z, scenario.target.z);
         let weight = scenario.weights.altitude;
-        let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max);
+        let middle = scenario.altitude.middle();
         // Legs are straight: a route beyond a height has a waypoint beyond it.
         let toll = |beyond: f64, ends_beyond: bool, up: f64| {
             let nothing = Toll {

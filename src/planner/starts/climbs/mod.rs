@@ -83,7 +83,7 @@ fn ways(model: &Model, share: f64) -> Found {
 
 impl Climb {
     fn by(scenario: &Scenario, share: f64) -> Self {
-        let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max);
+        let middle = scenario.altitude.middle();
         let own = [scenario.start, scenario.target]
             .map(|end| end.z - scenario.terrain.elevation(end.xy()));
         let nearer = own

@@ -237,7 +237,7 @@ mod tests {
                 assert!(may_turn_along(chain, sharpest));
                 assert!(price(&model, chain).is_feasible());
             }
-            let shortest = (scenario.target - scenario.start).norm();
+            let shortest = scenario.direct();
             let length: f64 = chains[0]
                 .windows(2)
                 .map(|leg| (leg[1] - leg[0]).norm())

@@ -27,7 +27,7 @@
 //! become in each format.
 //!
 //! The modules in reading order, each of which imports only from those before it: [`geometry`], [`terrain`], [`threat`],
-//! [`digest`], [`scenario`], [`cost`], [`optimizer`], [`seeding`], [`planner`], [`export`], [`import`], [`job`],
+//! [`digest`], [`durable`], [`scenario`], [`cost`], [`optimizer`], [`seeding`], [`planner`], [`export`], [`import`], [`job`],
 //! [`catalogue`], [`store`], [`worker`], [`http`], [`cli`]; besides [`config`] and [`telemetry`]. ARCHITECTURE.md, beside
 //! the manifest, walks through them.
 
@@ -36,8 +36,9 @@ pub mod geometry;
 pub mod terrain;
 pub mod threat;
 
-// What identifies bytes.
+// What identifies bytes, and how they are kept.
 pub mod digest;
+pub mod durable;
 
 // What is asked for, and what a route costs.
 pub mod scenario;

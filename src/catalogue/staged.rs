@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::content::{Checked, Declaration, Identity};
 use super::{CatalogueError, files};
+use crate::durable;
 use crate::terrain::dem::{DemError, Format, Lattice};
 
 /// An incoming file.
@@ -92,7 +93,7 @@ impl Staged {
 
     /// Move the file to `to`.
     pub(super) fn put(&self, to: &Path) -> io::Result<()> {
-        files::put(&self.path, to)
+        durable::put(&self.path, to)
     }
 }
 

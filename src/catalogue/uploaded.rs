@@ -16,6 +16,7 @@ use serde::de::DeserializeOwned;
 use super::content::Checked;
 use super::records::{Content, Name};
 use super::{CatalogueError, Entry, Kept, Naming, Room, Staged, Tally, Uploads, files};
+use crate::durable;
 use crate::terrain::dem;
 use crate::terrain::{DatasetError, Found};
 
@@ -44,7 +45,7 @@ impl Uploaded {
     pub(super) fn open(directory: &Path, grace: Duration) -> Result<Self, CatalogueError> {
         for part in ["incoming", "content", "names"] {
             let part = directory.join(part);
-            files::make_directory(&part)
+            durable::make_directory(&part)
                 .map_err(|error| CatalogueError::unavailable("made", &part, error))?;
         }
         let lock = files::lock(directory)?;
@@ -73,7 +74,7 @@ impl Uploaded {
             };
             if !self.content(sha256).is_file() {
                 // Left by an incomplete upload or an incomplete removal.
-                files::remove(&path)
+                durable::remove(&path)
                     .map_err(|error| CatalogueError::unavailable("removed", &path, error))?;
             } else if let Some(content) = read(&path) {
                 state.contents.insert(sha256.to_owned(), content);
@@ -255,7 +256,7 @@ impl Uploads for Uploaded {
         let mut state = self.state.lock();
         Name::removable(state.names.get(name), naming)?;
         let path = self.name(name);
-        files::remove(&path)
+        durable::remove(&path)
             .map_err(|error| CatalogueError::unavailable("removed", &path, error))?;
         state.names.remove(name);
         Ok(())
@@ -276,7 +277,7 @@ impl Uploads for Uploaded {
             }
             let path = self.content(&sha256);
             for path in [path.clone(), path.with_extension("json")] {
-                files::remove(&path)
+                durable::remove(&path)
                     .map_err(|error| CatalogueError::unavailable("removed", &path, error))?;
             }
             state.contents.remove(&sha256);

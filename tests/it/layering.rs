@@ -15,8 +15,9 @@ use Imports::{Above, Only};
 /// From the ground up: geometry knows nothing of flying, the optimizers nothing of routes, the engine nothing
 /// of stored plans, and no room knows the command line. Flags and logs stand below the engine: everything that
 /// may change a result is in the request.
-const ROOMS: [(&str, Imports); 19] = [
+const ROOMS: [(&str, Imports); 20] = [
     ("digest", Only(&[])),
+    ("durable", Only(&[])),
     ("geometry", Only(&[])),
     ("terrain", Above),
     ("threat", Above),

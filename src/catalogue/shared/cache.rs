@@ -13,6 +13,7 @@ use parking_lot::{Mutex, MutexGuard};
 use crate::catalogue::content::{Checked, Declaration, Identity};
 use crate::catalogue::stamp::Stamp;
 use crate::catalogue::{CatalogueError, Staged, files};
+use crate::durable;
 
 /// Files that are fetched or hashed concurrently.
 const LANES: usize = 16;
@@ -68,7 +69,7 @@ impl Cache {
     fn open_own(directory: &Path, limit: u64, grace: Duration) -> Result<Self, CatalogueError> {
         for part in ["incoming", "content"] {
             let part = directory.join(part);
-            files::make_directory(&part)
+            durable::make_directory(&part)
                 .map_err(|error| CatalogueError::unavailable("made", &part, error))?;
         }
         let lock = files::lock(directory)?;

@@ -1,23 +1,20 @@
 //! The files in the data directory: created, locked, opened, and made to survive a power failure.
 
-use std::fs::{DirBuilder, File, TryLockError};
-use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _};
+use std::fs::{File, TryLockError};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use rusqlite::Connection;
 
 use super::{BUSY_TIMEOUT, schema};
+use crate::durable;
 use crate::store::{StoreError, Trouble};
 
 /// Name of the file in the data directory whose lock keeps a second process out.
 const LOCK: &str = "noctule.lock";
 
 pub(super) fn create_directory(data_dir: &Path) -> Result<(), StoreError> {
-    let made = DirBuilder::new()
-        .recursive(true)
-        .mode(0o700)
-        .create(data_dir);
-    made.map_err(|error| {
+    durable::make_directory(data_dir).map_err(|error| {
         let what = format!("data directory {} cannot be made", data_dir.display());
         failed(&what, &error)
     })
@@ -25,18 +22,10 @@ pub(super) fn create_directory(data_dir: &Path) -> Result<(), StoreError> {
 
 pub(super) fn lock(data_dir: &Path) -> Result<File, StoreError> {
     let path = data_dir.join(LOCK);
-    let unusable = |error| failed(&format!("lock file {}", path.display()), &error);
-    let file = File::options()
-        .create(true)
-        .truncate(false)
-        .write(true)
-        .open(&path)
-        .map_err(unusable)?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(StoreError::InUse(data_dir.to_owned())),
-        Err(TryLockError::Error(error)) => Err(unusable(error)),
-    }
+    durable::hold(&path).map_err(|error| match error {
+        TryLockError::WouldBlock => StoreError::InUse(data_dir.to_owned()),
+        TryLockError::Error(error) => failed(&format!("lock file {}", path.display()), &error),
+    })
 }
 
 pub(super) fn open_database(file: &Path) -> Result<Connection, StoreError> {
@@ -53,10 +42,8 @@ pub(super) fn open_database(file: &Path) -> Result<Connection, StoreError> {
     Ok(connection)
 }
 
-/// A new file survives a power failure only when its directory entry is on the disk too.
 pub(super) fn sync_directory(data_dir: &Path) -> Result<(), StoreError> {
-    File::open(data_dir)
-        .and_then(|directory| directory.sync_all())
+    durable::sync_directory(data_dir)
         .map_err(|error| failed(&format!("data directory {}", data_dir.display()), &error))
 }
 

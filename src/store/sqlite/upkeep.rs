@@ -8,6 +8,7 @@ use rusqlite::types::{ToSqlOutput, ValueRef};
 use rusqlite::{Connection, OpenFlags};
 
 use super::{BUSY_TIMEOUT, DATABASE, StoreError};
+use crate::durable;
 use crate::job::{PlanId, Status};
 
 /// What [`check`] looked at, and what it found wrong.
@@ -182,9 +183,7 @@ fn hold(part: &Path) -> std::io::Result<File> {
 /// Rename a complete file to its final name; file and name are on the disk when this returns.
 fn put_in_place(part: &Path, to: &Path) -> std::io::Result<()> {
     File::open(part)?.sync_all()?;
-    std::fs::rename(part, to)?;
-    let directory = to.parent().filter(|parent| !parent.as_os_str().is_empty());
-    File::open(directory.unwrap_or(Path::new(".")))?.sync_all()
+    durable::put(part, to)
 }
 
 fn open(data_dir: &Path) -> Result<Connection, StoreError> {

@@ -80,15 +80,12 @@ impl Index {
             let [begins_above, ends_above] = ends.map(|end| vertices[end].y > point.y);
             return begins_above != ends_above;
         }
-        match halves(&run) {
-            Some([one, other]) => {
-                self.is_crossed(one, vertices, point) != self.is_crossed(other, vertices, point)
-            }
-            None => {
-                let edges = run.1.map(|edge| edge_of(vertices, edge));
-                edges.filter(|edge| ring::is_crossed(*edge, point)).count() % 2 == 1
-            }
+        if let Some([one, other]) = halves(&run) {
+            return self.is_crossed(one, vertices, point)
+                != self.is_crossed(other, vertices, point);
         }
+        let edges = run.1.map(|edge| edge_of(vertices, edge));
+        edges.filter(|edge| ring::is_crossed(*edge, point)).count() % 2 == 1
     }
 
     /// As [`ring::distance`]: edges whose boxes are farther away than a known edge cannot be nearest.
@@ -121,24 +118,21 @@ impl Index {
 /// Set the box of `run` and those within it.
 fn fill(boxes: &mut [Rect], vertices: &[Point2], run: Run) {
     let number = run.0;
-    boxes[number] = match halves(&run) {
-        Some(halves) => {
-            let [one, other] = halves.map(|half| {
-                let number = half.0;
-                fill(boxes, vertices, half);
-                boxes[number]
-            });
-            Rect {
-                min: one.min.inf(&other.min),
-                max: one.max.sup(&other.max),
-            }
+    boxes[number] = if let Some(halves) = halves(&run) {
+        let [one, other] = halves.map(|half| {
+            let number = half.0;
+            fill(boxes, vertices, half);
+            boxes[number]
+        });
+        Rect {
+            min: one.min.inf(&other.min),
+            max: one.max.sup(&other.max),
         }
-        None => {
-            let corners = run
-                .1
-                .flat_map(|edge| <[Point2; 2]>::from(edge_of(vertices, edge)));
-            Rect::around(corners).expect("a run has edges")
-        }
+    } else {
+        let corners = run
+            .1
+            .flat_map(|edge| <[Point2; 2]>::from(edge_of(vertices, edge)));
+        Rect::around(corners).expect("a run has edges")
     };
 }
 

@@ -1,6 +1,7 @@
 // One plan: what the service says about it, kept as it comes.
 
 import { ask } from './api.js';
+import { heightsAbove } from './beneath.js';
 import { RATE_HZ, follow } from './stream.js';
 
 const MOST_INCUMBENTS = 240;
@@ -11,6 +12,8 @@ export class Followed extends EventTarget {
   status = null;
   scenario = null;
   result = null;
+  /** How high above ground the points of its route are, as measured; null until that is known. */
+  above = null;
   points = [];
   incumbents = [];
   connected = true;
@@ -108,7 +111,16 @@ export class Followed extends EventTarget {
     }
     if (this.#closed) return;
     this.#tell('end');
+    if (this.result) this.#measure();
     if (this.result) this.#recall(this.result.timing.run_ms / 1000);
+  }
+
+  /** Without an answer, the ground is known as it is drawn. */
+  async #measure() {
+    const above = await heightsAbove(this).catch(() => null);
+    if (this.#closed || !above) return;
+    this.above = above;
+    this.#tell('ground');
   }
 
   /** Fetches the routes that were best on the way, where a short search was told of in few of them or in none. */

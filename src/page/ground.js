@@ -10,7 +10,8 @@ const PEAKS_NODES = 161;
 
 /**
  * The ground of a document: `extent` {min, max}, `at(x, y)`, `least`, `greatest`, and for other than flat ground
- * `mesh`: `columns` x `rows` nodes in `xs`, `ys`, `zs`. `sampled` is what the service says of a dataset.
+ * `mesh`: `columns` x `rows` nodes in `xs`, `ys`, `zs`. `sampled` is what the service says of a dataset; the ground has a mark of that
+ * name where it is of such samples, and `guessed` where it has none.
  */
 export function groundOf(document, frame, sampled = null) {
   const terrain = document.terrain ?? { kind: 'flat' };
@@ -21,7 +22,7 @@ export function groundOf(document, frame, sampled = null) {
   } catch {
     // A document under the pencil may lack anything; the service says what.
   }
-  return ground ?? flat({}, document, frame);
+  return ground ?? { ...flat({}, document, frame), sampled: true, guessed: true };
 }
 
 /** What is drawn: the document's own area, else a box round everything. */
@@ -125,7 +126,7 @@ function fromSamples({ area, columns, rows, elevations }, document, frame) {
     const places = [-1, 0, 1].flatMap((i) => [-1, 0, 1].map((j) => frame.to({ ...middle, [across]: middle[across] + i * step[0], [along]: middle[along] + j * step[1] })));
     return Math.max(...places.map((place) => at(place.x, place.y)));
   };
-  return { ...meshed(columns, rows, node, at), around };
+  return { ...meshed(columns, rows, node, at), around, sampled: true };
 }
 
 /** Elevation between nodes; beyond the edges that of the edge goes on. `cells` makes columns and rows of a place. */

@@ -30,7 +30,7 @@ import { turn } from './tabs.js';
 import { Tools } from './tools.js';
 import { onUndoKeys } from './undo.js';
 import { guard, isKept, keep } from './unsaved.js';
-import { faultText, metres, number } from './words.js';
+import { faultText, placeText } from './words.js';
 
 const draft = new Draft();
 let busy = false;
@@ -64,7 +64,7 @@ const stage = new Stage({ world, strip, chart, draft }, {
     if (k !== null) document.querySelector(`.legs tr[data-leg="${k}"]`)?.classList.add('marked');
   },
   marked: (place) => {
-    by('strip-at').textContent = place ? `${metres(place.distance, 0)}: ${number(place.z, 0)} m, ${number(place.z - place.ground, 0)} m above ground` : '';
+    by('strip-at').textContent = place ? placeText(place) : '';
   },
 });
 const again = new Again(by('watch'), (iteration, trail) => {
@@ -209,7 +209,7 @@ const LOST = 'The connection is lost. It is being resumed; nothing will be misse
 let running = null;
 
 function heard(plan, what) {
-  if (what === 'incumbent') stage.redraw();
+  if (what === 'incumbent' || what === 'ground') stage.redraw();
   if (what === 'search' || what === 'end') stage.drawSearch();
   if (what === 'end') {
     stage.world?.past(null);

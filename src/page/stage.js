@@ -1,6 +1,7 @@
 // What is shown: the draft's ground and threats, and on them the route of the plan in front and of those laid over it.
 
 import { ask } from './api.js';
+import { beneath, sameGround } from './beneath.js';
 import { describe } from './describe.js';
 import { atMost, eachFrame } from './dom.js';
 import { axes, frameOf } from './frame.js';
@@ -155,6 +156,11 @@ export class Stage {
     return way;
   }
 
+  /** The ground below a plan's route: see `beneath`. */
+  #below(plan, way) {
+    return beneath(way, this.ground, plan.above && sameGround(this.draft.document, plan.scenario) ? plan.above : null);
+  }
+
   #waypoints(plan) {
     return this.#way(plan.result?.waypoints ?? plan.latest?.waypoints);
   }
@@ -232,7 +238,7 @@ export class Stage {
     }
     const { min, max } = this.draft.document.altitude ?? {};
     this.strip.show(way && {
-      route: way, ground: this.ground, color, others, faults: this.#faultPlaces(waypoints).map(({ s, place }) => ({ s, z: place.z })),
+      route: way, below: this.#below(plan, way), color, others, faults: this.#faultPlaces(waypoints).map(({ s, place }) => ({ s, z: place.z })),
       band: Number.isFinite(min) && Number.isFinite(max) ? { min, max } : null,
       dots: waypoints ? waypoints.points.map((point, k) => ({ s: plan.result?.path ? way.nearest(point).distance : waypoints.flown[k], z: point.z })) : [],
     });
@@ -254,7 +260,7 @@ export class Stage {
     const place = way && distance !== null ? way.at(distance) : null;
     this.world?.mark(place);
     this.strip.mark(place ? distance : null);
-    this.acts.marked(place ? { ...place, distance, ground: this.ground.at(place.x, place.y) } : null);
+    this.acts.marked(place && { ...place, distance, ground: this.#below(this.plan, way)(distance) });
     const waypoints = place && this.#waypoints(this.plan);
     this.acts.legMarked(waypoints ? legOf(waypoints, waypoints.nearest(place).distance) : null);
   }

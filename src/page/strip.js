@@ -26,18 +26,15 @@ export class Strip {
     onSchemeChange(() => this.#draw());
   }
 
-  /** `route` is a `Way`; `dots` the waypoints on it; `band` heights above ground, or null; `others` ways with a color. */
+  /** `route` is a `Way`, `below(distance)` has the ground under it as `z`; `dots` the waypoints on it; `band` heights above ground, or null; `others` ways with a color. */
   show(shown) {
     if (!shown) {
       this.#shown = null;
       this.canvas.setAttribute('aria-label', 'No route yet');
     } else {
-      const { route, ground } = shown;
+      const { route, below } = shown;
       const along = Array.from({ length: SAMPLES + 1 }, (_, k) => (route.length * k) / SAMPLES);
-      const profile = along.map((s) => {
-        const { x, y } = route.at(s);
-        return { s, z: ground.at(x, y) };
-      });
+      const profile = along.map((s) => ({ s, z: below(s).z }));
       this.#shown = { ...shown, profile, length: Math.max(route.length, 1e-9) };
       const [low, high] = [Math.min(...profile.map((p) => p.z)), Math.max(...profile.map((p) => p.z))];
       this.canvas.setAttribute('aria-label', `Altitude along ${metres(route.length)}: ground from ${number(low, 0)} to ${number(high, 0)} m, route from ${number(route.least, 0)} to ${number(route.greatest, 0)} m`);

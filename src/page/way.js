@@ -26,8 +26,8 @@ export class Way {
     return this.#drawn;
   }
 
-  /** The place so far along it. */
-  at(distance) {
+  /** The points `low` and `high` between which the place so far along it lies, and its share `t` of the way from one to the other. */
+  locate(distance) {
     const { points, flown } = this;
     let [low, high] = [0, points.length - 1];
     while (high - low > 1) {
@@ -35,9 +35,14 @@ export class Way {
       if (flown[half] <= distance) low = half;
       else high = half;
     }
-    const [a, b] = [points[low], points[high]];
     const leg = flown[high] - flown[low];
-    const t = leg > 0 ? Math.min(Math.max((distance - flown[low]) / leg, 0), 1) : 0;
+    return { low, high, t: leg > 0 ? Math.min(Math.max((distance - flown[low]) / leg, 0), 1) : 0 };
+  }
+
+  /** The place so far along it. */
+  at(distance) {
+    const { low, high, t } = this.locate(distance);
+    const [a, b] = [this.points[low], this.points[high]];
     return { x: a.x + (b.x - a.x) * t, y: a.y + (b.y - a.y) * t, z: a.z + (b.z - a.z) * t };
   }
 

@@ -15,6 +15,12 @@ export const number = (value, decimals = 1) => (value === null || value === unde
 export const metres = (value, decimals = 1) =>
   value !== null && Math.abs(value) >= 10000 ? `${number(value / 1000, 2)} km` : `${number(value, decimals)} m`;
 
+/** A place of a route: how far along, how high, and how high above ground as far as that is known. */
+export function placeText({ distance, z, ground }) {
+  const above = ground.guessed ? '' : `, ${ground.sure ? '' : 'about '}${number(z - ground.z, 0)} m above ground`;
+  return `${metres(distance, 0)}: ${number(z, 0)} m${above}`;
+}
+
 /** A cost: four or five significant figures. */
 export const cost = (value) => number(value, value >= 1e5 ? 0 : value >= 1000 ? 1 : 2);
 

@@ -1,6 +1,7 @@
 // A search is watched and its end read; pointing at a place in one view marks it in the others.
 
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { LONG, SMALL, WALLED, around, ask, choose, FIRST, color, drawn, made, open, pixels, plan, scene, settled, wire } from './support.js';
 import { chrome, site } from './together.js';
@@ -64,6 +65,39 @@ test('the route is drawn where it is, and a place in it is one place everywhere'
   const chart = page.locator('#chart .u-over');
   await chart.hover({ position: { x: (await chart.boundingBox()).width - 1, y: 40 } });
   await page.waitForFunction(() => globalThis.noctule.scene().routes.some((one) => one.name === 'then'));
+  await page.done();
+});
+
+test('heights above the ground of a dataset are those of the ground, not of its drawing', async () => {
+  const scenario = { ...JSON.parse(readFileSync(new URL('../../scenarios/jacksboro-wgs84.json', import.meta.url), 'utf8')), name: 'fault' };
+  scenario.planner = { ...scenario.planner, iterations: 20, population: 50 };
+  const id = await made(site.url, scenario);
+  const table = await (await fetch(`${site.url}/plans/${id}/result?format=csv`)).text();
+  const [head, ...rows] = table.trim().split('\n').map((line) => line.split(','));
+  const [lat, lon, agl] = ['lat', 'lon', 'agl'].map((name) => head.indexOf(name));
+  const page = await open(chrome, `${site.url}#plan=${id}`);
+  await page.waitForFunction(() => globalThis.noctule?.scene()?.ground.columns === 201 && globalThis.noctule.routeAt(0.5));
+  const strip = await page.locator('#strip').boundingBox();
+  const sure = async (x) => {
+    // Until what was measured has come.
+    for (;;) {
+      await page.mouse.move(x, strip.y + 60);
+      await page.mouse.move(x + 1, strip.y + 60);
+      const said = await page.textContent('#strip-at');
+      const [, far, above] = said.replaceAll(',', '').match(/^([\d.]+) m: .* m ([\d.]+) m above ground$/) ?? [];
+      if (far) return { share: Number(far), above: Number(above) };
+    }
+  };
+  const places = rows.map((row) => ({ lat: Number(row[lat]), lon: Number(row[lon]), above: Number(row[agl]) }));
+  const spots = await page.evaluate((all) => all.map(globalThis.noctule.toMetres), places);
+  const flown = spots.map(() => 0);
+  spots.forEach((spot, k) => { if (k) flown[k] = flown[k - 1] + Math.hypot(spot.x - spots[k - 1].x, spot.y - spots[k - 1].y); });
+  // Up to ten kilometres, which are said to a metre.
+  for (let part = 0.1; part < 0.65; part += 0.02) {
+    const { share, above } = await sure(Math.round(strip.x + strip.width * part));
+    const near = places.filter((_, k) => Math.abs(flown[k] - share) < 12).map((place) => place.above);
+    assert.ok(above >= Math.min(...near) - 1 && above <= Math.max(...near) + 1, `${above} m at ${share} m, measured ${near}`);
+  }
   await page.done();
 });
 

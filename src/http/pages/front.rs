@@ -69,13 +69,14 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 54] = [
+static FILES: [File; 55] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
     file!("again.js"),
     file!("api.js"),
     file!("backdrop.js"),
+    file!("beneath.js"),
     file!("camera.js"),
     file!("chart.js"),
     file!("check.js"),

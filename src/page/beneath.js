@@ -34,10 +34,13 @@ export function beneath(way, ground, above = null) {
     return ground.at(x, y);
   };
   if (above?.length !== way.points.length) return (s) => ({ z: drawn(s), sure: !ground.sampled, guessed: ground.guessed });
-  const off = way.points.map(({ x, y, z }, k) => z - above[k] - ground.at(x, y));
+  const off = (k) => {
+    const { x, y, z } = way.points[k];
+    return z - above[k] - ground.at(x, y);
+  };
   return (s) => {
     const { low, high, t } = way.locate(s);
     const gap = way.flown[high] - way.flown[low];
-    return { z: drawn(s) + off[low] + (off[high] - off[low]) * t, sure: gap <= NEAR_M || Math.min(t, 1 - t) * gap < 1 };
+    return { z: drawn(s) + off(low) * (1 - t) + off(high) * t, sure: gap <= NEAR_M || Math.min(t, 1 - t) * gap < 1 };
   };
 }

@@ -55,7 +55,7 @@ try {
   by('hint').textContent = 'This browser has no WebGL, so there is no scene. The form, the strip and the tables have everything.';
   by('hint').hidden = false;
 }
-const strip = new Strip(by('strip'), (distance) => stage.mark(distance));
+const strip = new Strip(by('strip'), by('strip-what'), (distance) => stage.mark(distance));
 const chart = new Chart(by('chart'), by('legend'), (iteration) => stage.scrub(iteration));
 const stage = new Stage({ world, strip, chart, draft }, {
   selected: (index) => editor.select(index),

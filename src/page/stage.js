@@ -219,7 +219,7 @@ export class Stage {
     const color = broken ? colours.fault : colours.route;
     const others = [...this.compared.values()].flatMap((other) => {
       const path = this.wayOf(other.plan);
-      return path ? [{ way: path, color: other.color, id: other.plan.id }] : [];
+      return path ? [{ way: path, below: this.#below(other.plan, path), color: other.color, name: other.name, id: other.plan.id }] : [];
     });
     if (this.world) {
       if (plan && !plan.result && plan.latest && this.#trailed !== plan.latest) {

@@ -1,10 +1,12 @@
-// The altitude strip: ground and band along the route, its waypoints, and the path.
+// The altitude strip: ground and band along the route, its waypoints, and the path; and the routes laid over it, each as far as it goes.
 
 import { eachFrame } from './dom.js';
 import { onSchemeChange, palette } from './palette.js';
 import { decimalsOf, metres, number, step } from './words.js';
 
 const SAMPLES = 400;
+const ALONE = 'along the route, above the datum';
+const TOGETHER = 'ground and band of the route in front; dotted, the ground of the others';
 const EDGE = { left: 46, right: 12, top: 10, bottom: 20 };
 
 export class Strip {
@@ -12,33 +14,37 @@ export class Strip {
   #marked = null;
   #draw = eachFrame(() => this.#paint());
 
-  /** `pointed(distance)` is told where along the route the pointer is; null where it is not. */
-  constructor(canvas, pointed) {
-    this.canvas = canvas;
+  /** `caption` says what is drawn; `pointed(distance)` is told where along the route the pointer is; null where it is not. */
+  constructor(canvas, caption, pointed) {
+    Object.assign(this, { canvas, caption });
     canvas.addEventListener('pointermove', (event) => {
       const scales = this.#scales();
       if (!scales) return;
       const share = (event.offsetX - EDGE.left) / scales.wide;
-      pointed(share >= 0 && share <= 1 ? share * this.#shown.length : null);
+      const distance = share * this.#shown.length;
+      pointed(distance >= 0 && distance <= this.#shown.route.length ? distance : null);
     });
     canvas.addEventListener('pointerleave', () => pointed(null));
     new ResizeObserver(() => this.#draw()).observe(canvas);
     onSchemeChange(() => this.#draw());
   }
 
-  /** `route` is a `Way`, `below(distance)` has the ground under it as `z`; `dots` the waypoints on it; `band` heights above ground, or null; `others` ways with a color. */
+  /**
+   * `route` is a `Way`, `below(distance)` has the ground under it as `z`; `dots` the waypoints on it; `band` heights above ground, or
+   * null; `others` routes with a `name`, `color`, `way` and `below`.
+   */
   show(shown) {
     if (!shown) {
       this.#shown = null;
       this.canvas.setAttribute('aria-label', 'No route yet');
     } else {
       const { route, below } = shown;
-      const along = Array.from({ length: SAMPLES + 1 }, (_, k) => (route.length * k) / SAMPLES);
-      const profile = along.map((s) => ({ s, z: below(s).z }));
-      this.#shown = { ...shown, profile, length: Math.max(route.length, 1e-9) };
-      const [low, high] = [Math.min(...profile.map((p) => p.z)), Math.max(...profile.map((p) => p.z))];
-      this.canvas.setAttribute('aria-label', `Altitude along ${metres(route.length)}: ground from ${number(low, 0)} to ${number(high, 0)} m, route from ${number(route.least, 0)} to ${number(route.greatest, 0)} m`);
+      const others = shown.others.map((other) => ({ ...other, profile: profileOf(other.way, other.below) }));
+      const length = [route, ...others.map(({ way }) => way)].reduce((most, way) => Math.max(most, way.length), 1e-9);
+      this.#shown = { ...shown, others, length, profile: profileOf(route, below) };
+      this.canvas.setAttribute('aria-label', inWords(this.#shown));
     }
+    this.caption.textContent = shown?.others.length ? TOGETHER : ALONE;
     this.#draw();
   }
 
@@ -57,6 +63,7 @@ export class Strip {
       low = Math.min(low, z);
       high = Math.max(high, z + (band ? Math.min(band.max, 4 * (route.greatest - route.least) + band.min + 50) : 0));
     }
+    for (const { z } of others.flatMap((other) => other.profile)) low = Math.min(low, z);
     low = Math.min(low, ...heights);
     high = Math.max(high, ...heights);
     const room = Math.max((high - low) * 0.06, 1);
@@ -99,8 +106,11 @@ export class Strip {
     pen.lineTo(scales.x(0), scales.y(scales.low));
     fill(pen, colours.ground);
     for (const other of others) {
-      const fit = route.length / other.way.length;
-      trace(pen, other.way.points.map(({ z }, k) => [scales.x(other.way.flown[k] * fit), scales.y(z)]));
+      trace(pen, other.profile.map(({ s, z }) => [scales.x(s), scales.y(z)]));
+      pen.setLineDash([1, 4]);
+      stroke(pen, other.color, 1);
+      pen.setLineDash([]);
+      trace(pen, other.way.points.map(({ z }, k) => [scales.x(other.way.flown[k]), scales.y(z)]));
       stroke(pen, other.color, 1.5);
     }
     trace(pen, route.points.map(({ z }, k) => [scales.x(route.flown[k]), scales.y(z)]));
@@ -135,6 +145,21 @@ export class Strip {
       pen.fillText(far ? `${+(s / 1000).toFixed(2)} km` : `${number(s, decimalsOf(way))} m`, Math.max(x(s), EDGE.left + 8), EDGE.top + tall + 5);
     }
   }
+}
+
+/** The ground below a way, at places evenly spaced along it. */
+function profileOf(way, below) {
+  return Array.from({ length: SAMPLES + 1 }, (_, k) => {
+    const s = (way.length * k) / SAMPLES;
+    return { s, z: below(s).z };
+  });
+}
+
+function inWords({ route, profile, others }) {
+  const [low, high] = [Math.min(...profile.map((p) => p.z)), Math.max(...profile.map((p) => p.z))];
+  const heights = (way) => `from ${number(way.least, 0)} to ${number(way.greatest, 0)} m`;
+  const laid = others.map(({ name, way }) => `; laid over, ${name}, ${metres(way.length)}, ${heights(way)}`);
+  return `Altitude along ${metres(route.length)}: ground from ${number(low, 0)} to ${number(high, 0)} m, route ${heights(route)}${laid.join('')}`;
 }
 
 function trace(pen, points) {

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { LONG, SMALL, ask, color, FIRST, document_, drawn, fill, held, made, open, pixels, plan, scene, service } from './support.js';
+import { LONG, SMALL, ask, color, FIRST, document_, drawn, fill, held, made, open, pixels, plan, scene, service, settled } from './support.js';
 import { chrome, site } from './together.js';
 
 test('two plans are laid over one another in scene and chart', async () => {
@@ -26,6 +26,35 @@ test('two plans are laid over one another in scene and chart', async () => {
   await again.done();
   await page.uncheck('[aria-label="Lay two over"]');
   await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 1);
+  await page.done();
+});
+
+test('in the strip each route goes as far as it is long', async () => {
+  const detour = { ...SMALL, name: 'detour', area: { min: { x: -1000, y: -1000 }, max: { x: 2000, y: 2000 } }, threats: [{ ...SMALL.threats[0], radius: 600, influence: 700 }],
+    start: { x: -300, y: -300, z: 50 }, target: { x: 1300, y: 1300, z: 50 } };
+  const first = await made(site.url, { ...detour, name: 'straight', threats: [] });
+  await made(site.url, detour);
+  const page = await open(chrome, `${site.url}#plan=${first}`);
+  await page.waitForSelector('.verdict');
+  const strip = await page.locator('#strip').boundingBox();
+  // Beside its edges, with what is left of the figure for the routes.
+  const end = { x: strip.x + strip.width - 40, y: strip.y, width: 26, height: strip.height - 20 };
+  const [route, other] = [await color(page, 'route'), await color(page, 'other-0')];
+  assert.ok(await pixels(page, route, end) > 20);
+  assert.doesNotMatch(await page.textContent('#strip-what'), /in front/);
+  await page.click('#tab-plans');
+  await page.check('[aria-label="Lay detour over"]');
+  await page.waitForFunction(() => /laid over, detour, [\d,.]+ m, from/.test(document.getElementById('strip').getAttribute('aria-label')));
+  await settled(page);
+  assert.equal(await pixels(page, route, end), 0, 'the shorter one has ended before');
+  assert.ok(await pixels(page, other, end) > 10);
+  assert.match(await page.textContent('#strip-what'), /ground and band of the route in front/);
+  // Beyond its end the route in front has no place to be marked.
+  await page.mouse.move(end.x + 20, end.y + 50);
+  await page.mouse.move(end.x + 21, end.y + 50);
+  assert.equal((await scene(page)).mark, 0);
+  await page.uncheck('[aria-label="Lay detour over"]');
+  await page.waitForFunction(() => !/in front/.test(document.getElementById('strip-what').textContent));
   await page.done();
 });
 

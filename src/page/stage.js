@@ -7,6 +7,7 @@ import { atMost, eachFrame } from './dom.js';
 import { axes, frameOf } from './frame.js';
 import { extentOf, groundOf, isOf } from './ground.js';
 import { palette } from './palette.js';
+import { passes } from './passes.js';
 import { ceilingOf, threatsOf } from './volumes.js';
 import { Way } from './way.js';
 
@@ -29,6 +30,7 @@ export class Stage {
   /** The dataset that the camera has been turned to. */
   #framed = null;
   #threats = [];
+  #passes = {};
   #trailed = null;
   #ways = new WeakMap();
   #scrubbed = null;
@@ -161,6 +163,13 @@ export class Stage {
     return beneath(way, this.ground, plan.above && sameGround(this.draft.document, plan.scenario) ? plan.above : null);
   }
 
+  /** What a way passes, looked for once. */
+  #passed(way) {
+    const known = this.#passes;
+    if (known.way !== way || known.threats !== this.#threats) this.#passes = { way, threats: this.#threats, found: passes(way, this.#threats) };
+    return this.#passes.found;
+  }
+
   #waypoints(plan) {
     return this.#way(plan.result?.waypoints ?? plan.latest?.waypoints);
   }
@@ -238,7 +247,8 @@ export class Stage {
     }
     const { min, max } = this.draft.document.altitude ?? {};
     this.strip.show(way && {
-      route: way, below: this.#below(plan, way), color, others, faults: this.#faultPlaces(waypoints).map(({ s, place }) => ({ s, z: place.z })),
+      route: way, below: this.#below(plan, way), passed: this.#passed(way), color, others,
+      faults: this.#faultPlaces(waypoints).map(({ s, place }) => ({ s, z: place.z })),
       band: Number.isFinite(min) && Number.isFinite(max) ? { min, max } : null,
       dots: waypoints ? waypoints.points.map((point, k) => ({ s: plan.result?.path ? way.nearest(point).distance : waypoints.flown[k], z: point.z })) : [],
     });

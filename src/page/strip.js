@@ -1,10 +1,15 @@
-// The altitude strip: ground and band along the route, its waypoints, and the path; and the routes laid over it, each as far as it goes.
+// The altitude strip: ground and band along the route, threats that it passes, its waypoints, and the path; and the routes laid over it.
 
 import { eachFrame } from './dom.js';
 import { onSchemeChange, palette } from './palette.js';
-import { decimalsOf, metres, number, step } from './words.js';
+import { decimalsOf, metres, number, step, threatName } from './words.js';
 
 const SAMPLES = 400;
+/** Of threats so many are named in words. */
+const NAMED = 5;
+/** So wide a stretch has room for a name, in pixels for each of its letters. */
+const LETTER_PX = 7;
+const LINE_PX = 14;
 const ALONE = 'along the route, above the datum';
 const TOGETHER = 'ground and band of the route in front; dotted, the ground of the others';
 const EDGE = { left: 46, right: 12, top: 10, bottom: 20 };
@@ -31,7 +36,7 @@ export class Strip {
 
   /**
    * `route` is a `Way`, `below(distance)` has the ground under it as `z`; `dots` the waypoints on it; `band` heights above ground, or
-   * null; `others` routes with a `name`, `color`, `way` and `below`.
+   * null; `passed` what `passes` finds; `others` routes with a `name`, `color`, `way` and `below`.
    */
   show(shown) {
     if (!shown) {
@@ -101,10 +106,12 @@ export class Strip {
       for (const { s, z } of [...profile].reverse()) pen.lineTo(scales.x(s), scales.y(z + band.min));
       fill(pen, colours.band);
     }
+    this.#threats(pen, scales, colours);
     trace(pen, profile.map(({ s, z }) => [scales.x(s), scales.y(z)]));
     pen.lineTo(scales.x(profile.at(-1).s), scales.y(scales.low));
     pen.lineTo(scales.x(0), scales.y(scales.low));
     fill(pen, colours.ground);
+    this.#names(pen, scales, colours);
     for (const other of others) {
       trace(pen, other.profile.map(({ s, z }) => [scales.x(s), scales.y(z)]));
       pen.setLineDash([1, 4]);
@@ -123,6 +130,33 @@ export class Strip {
       trace(pen, [[scales.x(this.#marked), EDGE.top], [scales.x(this.#marked), EDGE.top + scales.tall]]);
       stroke(pen, colours.faint, 1);
       dot(pen, scales.x(this.#marked), scales.y(z), 5, color, colours.ink);
+    }
+  }
+
+  /** From base to top where the route's place on the map is within: what it is beside, over or under there. */
+  #threats(pen, { low, high, x, y }, colours) {
+    for (const { threat, core, from, to } of this.#shown.passed) {
+      const [left, wide] = [x(from), Math.max(x(to) - x(from), 1.5)];
+      const { top, bottom } = between(threat, low, high, y);
+      pen.fillStyle = core ? colours.core : colours.zone;
+      pen.globalAlpha = core ? 0.24 : 0.13;
+      pen.fillRect(left, top, wide, bottom - top);
+      pen.globalAlpha = 0.9;
+      for (const limit of [threat.base, threat.top]) if (limit !== null && limit > low && limit < high) pen.fillRect(left, y(limit) - 0.5, wide, 1);
+      pen.globalAlpha = 1;
+    }
+  }
+
+  /** Each threat's once, where its widest stretch has room for it. */
+  #names(pen, { low, high, x, y }, colours) {
+    const widest = new Map();
+    for (const { threat, from, to } of this.#shown.passed) if (!(widest.get(threat)?.wide >= to - from)) widest.set(threat, { from, wide: to - from });
+    Object.assign(pen, { fillStyle: colours.ink, textAlign: 'left', textBaseline: 'top' });
+    for (const [threat, { from, wide }] of widest) {
+      const name = threatName(threat, threat.index);
+      const { top, bottom } = between(threat, low, high, y);
+      const ground = this.#shown.below(from + wide / 2).z;
+      if (Math.min(bottom, y(ground)) - top > LINE_PX && x(from + wide) - x(from) > name.length * LETTER_PX) pen.fillText(name, x(from) + 3, top + 3);
     }
   }
 
@@ -147,6 +181,12 @@ export class Strip {
   }
 }
 
+/** Where base and top of a threat are on the canvas, as far as they are on it. */
+function between({ base, top }, low, high, y) {
+  const within = (z) => y(Math.min(Math.max(z, low), high));
+  return { top: within(top ?? high), bottom: within(base ?? low) };
+}
+
 /** The ground below a way, at places evenly spaced along it. */
 function profileOf(way, below) {
   return Array.from({ length: SAMPLES + 1 }, (_, k) => {
@@ -155,11 +195,14 @@ function profileOf(way, below) {
   });
 }
 
-function inWords({ route, profile, others }) {
+function inWords({ route, profile, passed, others }) {
   const [low, high] = [Math.min(...profile.map((p) => p.z)), Math.max(...profile.map((p) => p.z))];
   const heights = (way) => `from ${number(way.least, 0)} to ${number(way.greatest, 0)} m`;
   const laid = others.map(({ name, way }) => `; laid over, ${name}, ${metres(way.length)}, ${heights(way)}`);
-  return `Altitude along ${metres(route.length)}: ground from ${number(low, 0)} to ${number(high, 0)} m, route ${heights(route)}${laid.join('')}`;
+  const names = [...new Set(passed.map(({ threat }) => threat))].map((threat) => threatName(threat, threat.index));
+  const more = names.length > NAMED ? ` and ${names.length - NAMED} more` : '';
+  const past = names.length ? `; beside, over or under ${names.slice(0, NAMED).join(', ')}${more}` : '';
+  return `Altitude along ${metres(route.length)}: ground from ${number(low, 0)} to ${number(high, 0)} m, route ${heights(route)}${past}${laid.join('')}`;
 }
 
 function trace(pen, points) {

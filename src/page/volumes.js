@@ -143,7 +143,7 @@ function prism(ring, low, high) {
   return geometry;
 }
 
-/** Threats of a document in metres of the frame, with `low` and `high` where they have no limit of their own. */
+/** Threats of a document in metres of the frame: `base` and `top`, null for none, and `low` and `high` between which they are drawn. */
 export function threatsOf(document, frame, ground) {
   const ceiling = ceilingOf(document, ground);
   const drawn = [];
@@ -152,7 +152,7 @@ export function threatsOf(document, frame, ground) {
     const top = Number.isFinite(threat.top) ? threat.top : ceiling;
     // Above all that is drawn it would be out of sight, and its outlines on the ground look like a threat there.
     const low = Math.min(base, ceiling);
-    const common = { index, name: threat.name, low, high: Math.max(base < ceiling ? top : ceiling, low + 1e-3) };
+    const common = { index, name: threat.name, base: limit(threat.base), top: limit(threat.top), low, high: Math.max(base < ceiling ? top : ceiling, low + 1e-3) };
     if (threat.kind === 'polygon') {
       const ring = (threat.vertices ?? []).filter(isPlace).map(frame.to);
       if (ring.length >= 3) drawn.push({ ...common, ring, margin: finite(threat.margin), center: null });
@@ -162,6 +162,8 @@ export function threatsOf(document, frame, ground) {
   });
   return drawn;
 }
+
+const limit = (height) => (Number.isFinite(height) ? height : null);
 
 /** Up to where a threat without a top is drawn. */
 export function ceilingOf(document, ground) {

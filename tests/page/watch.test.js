@@ -101,6 +101,27 @@ test('heights above the ground of a dataset are those of the ground, not of its 
   await page.done();
 });
 
+test('the strip has the threats that the route passes, from base to top', async () => {
+  const cylinder = (name, x, y, more) => ({ kind: 'cylinder', name, center: { x, y }, radius: 120, influence: 120, ...more });
+  const threats = [
+    cylinder('below', 300, 300, { top: 10 }), cylinder('aside', 900, 100, {}),
+    { kind: 'polygon', name: 'shelf', base: 110, vertices: [{ x: 600, y: 600 }, { x: 800, y: 600 }, { x: 800, y: 800 }, { x: 600, y: 800 }] },
+  ];
+  const page = await open(chrome, `${site.url}#plan=${await made(site.url, { ...SMALL, threats })}`);
+  await page.waitForSelector('.verdict.good');
+  await page.waitForFunction(() => /; beside, over or under below, shelf$/.test(document.getElementById('strip').getAttribute('aria-label')));
+  await settled(page);
+  const strip = await page.locator('#strip').boundingBox();
+  // The axes leave 46 pixels on the left and 12 on the right. Of white and 24 % of the colour of cores.
+  const core = (await color(page, 'core')).slice(1).match(/../g).map((part) => parseInt(part, 16));
+  const tint = `#${core.map((part) => Math.round(255 + (part - 255) * 0.24).toString(16).padStart(2, '0')).join('')}`;
+  const column = (share) => ({ x: strip.x + 46 + (strip.width - 58) * share - 4, y: strip.y + 12, width: 8, height: strip.height - 32 });
+  const seen = [];
+  for (const share of [0.25, 0.5, 0.75]) seen.push(await pixels(page, tint, column(share)));
+  assert.ok(seen[0] > 20 && seen[1] === 0 && seen[2] > 20, `${seen}`);
+  await page.done();
+});
+
 test('a long route is drawn of few points, and known in all', async () => {
   const far = { min: { x: 0, y: 0 }, max: { x: 31000, y: 31000 } };
   const id = await made(site.url, { ...SMALL, area: far, target: { x: 30000, y: 30000, z: 50 }, threats: [{ kind: 'cylinder', center: { x: 15000, y: 15000 }, radius: 5000 }] });

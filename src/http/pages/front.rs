@@ -69,7 +69,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 55] = [
+static FILES: [File; 56] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -100,6 +100,7 @@ static FILES: [File; 55] = [
     file!("new.js"),
     file!("notice.js"),
     file!("palette.js"),
+    file!("passes.js"),
     file!("plans.js"),
     file!("print.js"),
     file!("relief.js"),

@@ -56,6 +56,26 @@ export class Editor {
     this.show();
   }
 
+  /** Which datasets there are to choose from. */
+  datasets(names) {
+    if (JSON.stringify(names) === JSON.stringify(this.#menu.terrains)) return;
+    this.#menu.terrains = names;
+    if (this.draft.document?.terrain?.kind !== 'dataset') return;
+    const choose = this.root.querySelector('select[data-pointer="/terrain/name"]');
+    // It may be unfolded, and is built anew only where it becomes another field.
+    if (!choose || !names.length) this.menu({});
+    else {
+      choose.replaceChildren(...this.#datasets(this.draft.document).map(([value, text]) => el('option', { value }, text)));
+      this.form.sync();
+    }
+  }
+
+  /** The one that is chosen is among them, whether or not the service has it. */
+  #datasets({ terrain: { name } }) {
+    const { terrains } = this.#menu;
+    return [...terrains.map((one) => [one, one]), ...(!name || terrains.includes(name) ? [] : [[name, `${name}, which is not there`]])];
+  }
+
   show(defaults) {
     const document = this.draft.document;
     if (!document) return;
@@ -268,7 +288,7 @@ export class Editor {
       flat: () => [this.form.number('/terrain/elevation', 'Elevation', 'm')],
       grid: () => [el('p', { class: 'faint' }, `${terrain.columns} × ${terrain.rows} nodes, ${terrain.cell} m apart`)],
       dataset: () => [this.#menu.terrains.length
-        ? this.form.choice('/terrain/name', 'Dataset', this.#menu.terrains.map((name) => [name, name]), {})
+        ? this.form.choice('/terrain/name', 'Dataset', this.#datasets(document), {})
         : this.form.text('/terrain/name', 'Dataset')],
       peaks: () => [this.form.number('/terrain/base', 'Base', 'm'), ...(terrain.peaks ?? []).map((_, k) => this.#peak(document, k)),
         el('button', { type: 'button', onclick: () => this.acts.addPeak() }, 'Add a mountain')],

@@ -1,10 +1,11 @@
 // The page put together: what is chosen, planned, looked at, compared and taken away.
 
-import { Refused, Said, UNREACHABLE, ask, onKeyNeeded, send } from './api.js';
+import { Refused, Said, UNREACHABLE, ask, onKeyNeeded } from './api.js';
 import { Again } from './again.js';
 import { cameraOf } from './camera.js';
 import { Chart } from './chart.js';
 import { checkAsItChanges } from './check.js';
+import { offerDatasets } from './datasets.js';
 import { atMost, by } from './dom.js';
 import { Draft } from './draft.js';
 import { onDrop } from './dropped.js';
@@ -444,5 +445,4 @@ async function start() {
 showNone();
 stage.drawSearch();
 await start();
-// Only where the service has datasets, and the caller may see them.
-send('/terrains', { quiet: true }).then((answer) => answer.json()).then(({ terrains }) => editor.menu({ terrains: terrains.map(({ name }) => name) })).catch(() => {});
+offerDatasets(editor);

@@ -410,6 +410,36 @@ test('the ground of a dataset is drawn as the service has it', async (t) => {
   await page.done();
 });
 
+test('datasets that come and go meanwhile are offered when one is chosen, and when the page is seen again', async (t) => {
+  const own = await service();
+  t.after(own.stop);
+  const file = readFileSync(new URL('../../scenarios/terrain/jacksboro.tif', import.meta.url));
+  const put = async (name) => assert.equal((await fetch(`${own.url}/terrains/${name}`, { method: 'PUT', body: file })).status, 201);
+  const page = await open(chrome, own.url);
+  await drawn(page, FIRST);
+  await page.click('#empty-in-degrees');
+  await drawn(page, 0);
+  await page.click('summary:text-is("Ground")');
+  await page.selectOption('[data-pointer="/terrain"]', 'dataset');
+  const offered = () => page.locator('[data-pointer="/terrain/name"] option').allTextContents();
+  const offers = (names) => page.waitForFunction((wanted) => [...document.querySelectorAll('[data-pointer="/terrain/name"] option')].map(({ textContent }) => textContent).join() === wanted, names.join());
+  await offers(['jacksboro']);
+  await put('second');
+  await page.focus('[data-pointer="/terrain/name"]');
+  await offers(['jacksboro', 'second']);
+  assert.equal(await page.evaluate(() => document.activeElement.dataset.pointer), '/terrain/name', 'it keeps the focus');
+  await page.selectOption('[data-pointer="/terrain/name"]', 'second');
+  await put('third');
+  await page.evaluate(() => document.dispatchEvent(new Event('visibilitychange')));
+  await offers(['jacksboro', 'second', 'third']);
+  assert.equal(await page.inputValue('[data-pointer="/terrain/name"]'), 'second', 'what was chosen stays chosen');
+  assert.equal((await fetch(`${own.url}/terrains/second`, { method: 'DELETE' })).status, 204);
+  await page.click('[data-pointer="/terrain/name"]');
+  await offers(['jacksboro', 'third', 'second, which is not there']);
+  assert.equal(await page.inputValue('[data-pointer="/terrain/name"]'), 'second', `${await offered()}`);
+  await page.done();
+});
+
 test('the ground of a dataset follows what is moved where no area is given, and the camera stays', async (t) => {
   const directory = fileURLToPath(new URL('../../scenarios', import.meta.url));
   const mapped = await service('--terrain-dir', join(directory, 'terrain'));

@@ -69,7 +69,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 56] = [
+static FILES: [File; 57] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -80,6 +80,7 @@ static FILES: [File; 56] = [
     file!("camera.js"),
     file!("chart.js"),
     file!("check.js"),
+    file!("datasets.js"),
     file!("describe.js"),
     file!("dom.js"),
     file!("draft.js"),

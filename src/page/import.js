@@ -1,16 +1,20 @@
 // A file as a scenario: read here where it is one already, turned into one by the service where it is a map.
 
 import { Said, ask } from './api.js';
+import { frameOf } from './frame.js';
 import { threatName } from './words.js';
 
 /** So many places are named for a reason, and so many reasons given: the rest is counted. */
 const NAMED = 3;
 const REASONS = 5;
+/** How far from start and target the service looks for zones at least, and at most. */
+const LEAST_M = 1000;
+const MOST_M = 100000;
 const CAN_BE_OPENED = 'What can be opened: scenarios in JSON, GeoJSON, KML, plans of QGroundControl, and maps of airspace (OpenAir, ED-269, ED-318).';
 
 /**
  * The document in a file, and what there is to say about it. A map without start and target is laid over `open`, the document that is
- * shown.
+ * shown; `area` is then that of the map, where the document keeps one of its own.
  */
 export async function readFile(file, open) {
   const text = await file.text();
@@ -42,7 +46,7 @@ export async function readFile(file, open) {
     if (!ends || refusal.problem?.type !== '/problems/no-scenario') throw inWords(refusal, file, ends);
   }
   try {
-    return laidOver(open, await converted(`?${new URLSearchParams(ends)}`));
+    return laidOver(open, await converted(`?${new URLSearchParams({ ...ends, ...within(open) })}`));
   } catch (refusal) {
     throw inWords(refusal, file, ends);
   }
@@ -62,12 +66,25 @@ function endsOf({ frame, start, target }) {
   return { start: places[0].join(','), target: places[1].join(',') };
 }
 
+/**
+ * How far from start and target zones are wanted, where the document has an area that leads farther than the service looks by itself:
+ * none in it is to be left out.
+ */
+function within({ area, ...document }) {
+  const { to } = frameOf(document);
+  const [start, target, min, max] = [document.start, document.target, area?.min, area?.max].map((place) => to(place ?? {}));
+  const far = ['x', 'y'].flatMap((axis) => [Math.min(start[axis], target[axis]) - min[axis], max[axis] - Math.max(start[axis], target[axis])]);
+  const wanted = Math.ceil(Math.max(...far) * 1.02);
+  const usual = Math.max(LEAST_M, Math.hypot(target.x - start.x, target.y - start.y) / 2);
+  return wanted > usual ? { within: String(Math.min(wanted, MOST_M)) } : {};
+}
+
 /** What was converted, as a document of its own. */
 function whole({ scenario, assumed, unused }) {
   return { document: scenario, note: note(scenario, assumed, unused) };
 }
 
-/** The zones of a map as further threats of the document that is open. */
+/** The zones of a map as further threats of the document that is open, in the area that this has; in one around the zones where it has none. */
 function laidOver(open, { scenario, assumed, unused }) {
   const datum = open.altitude_datum ?? 'msl';
   const limited = scenario.threats.some(({ base, top }) => base !== null || top !== null);
@@ -75,10 +92,19 @@ function laidOver(open, { scenario, assumed, unused }) {
     throw new Said(`The heights in the file are above another datum (${scenario.altitude_datum}) than those of the scenario (${datum}).`);
   }
   const { threats } = scenario;
-  const document = { ...open, area: scenario.area, threats: [...(open.threats ?? []), ...threats] };
+  const kept = Object.keys(open.area ?? {}).length > 0;
+  const document = { ...open, area: kept ? open.area : scenario.area, threats: [...(open.threats ?? []), ...threats] };
   const added = threats.length === 1 ? 'One threat was added.' : `${threats.length} threats were added.`;
   const ofZones = assumed.filter(({ pointer }) => /^\/(area|threats)/.test(pointer));
-  return { document, note: [added, note(scenario, ofZones, unused)].filter(Boolean).join(' ') };
+  if (!kept) return { document, note: [added, note(scenario, ofZones, unused)].filter(Boolean).join(' ') };
+  const said = note(scenario, ofZones.filter(({ pointer }) => pointer !== '/area'), unused);
+  return { document, area: scenario.area, note: [added, ofArea(ofZones), said].filter(Boolean).join(' ') };
+}
+
+/** What there is to say of an area that stays: how many zones are too far off, of which the service tells beside the one that it took. */
+function ofArea(assumed) {
+  const [, count] = assumed.find(({ pointer }) => pointer === '/area')?.reason.match(/left out: (\d+)/) ?? [];
+  return `The scenario keeps its area.${Number(count) ? ` Zones of the map that lie elsewhere are left out: ${count}.` : ''}`;
 }
 
 /** What there is to say of a conversion; null where there is nothing. */

@@ -117,11 +117,11 @@ function begin(document_, plan = null, kept = true) {
 async function openFile(file) {
   wishes += 1;
   const wish = wishes;
-  const { document: read, note } = await readFile(file, draft.document ?? {});
+  const { document: read, note, area } = await readFile(file, draft.document ?? {});
   if (wish !== wishes) return;
   stepFrom(draft.document);
   begin(read);
-  if (note) tell(note, 'note');
+  if (note) tell(note, 'note', area && ['Take the area of the map', () => { draft.set('/area', area); tell('The area is that of the map.', 'note'); }]);
 }
 
 checkAsItChanges(draft, editor, stage);

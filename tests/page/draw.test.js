@@ -78,6 +78,29 @@ test('a map of zones is laid over a scenario in degrees', async () => {
   await page.done();
 });
 
+test('a map of zones leaves the area as it was, until the person says otherwise', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  const area = { min: { lat: 36.4, lon: -84.4 }, max: { lat: 36.6, lon: -84.1 } };
+  const own = { name: 'own', frame: 'wgs84', start: { lat: 36.49, lon: -84.23, alt: 400 }, target: { lat: 36.5, lon: -84.22, alt: 400 }, area, threats: [], altitude: { min: 20, max: 300 } };
+  await drop(page, 'own.json', JSON.stringify(own), 'application/json');
+  await page.waitForFunction(() => globalThis.noctule.document().name === 'own');
+  const zone = (name, center) => `AC R\nAN ${name}\nAL GND\nAH 9500ft MSL\nV X=${center}\nDC 0.2\n`;
+  // Far from the flight, and within the area all the same.
+  await drop(page, 'zones.txt', zone('edge', '36:35:00 N 084:22:00 W') + zone('abroad', '47:00:00 N 008:00:00 E'), 'text/plain');
+  await drawn(page, 1);
+  assert.equal((await document_(page)).threats[0].name, 'edge');
+  assert.deepEqual((await document_(page)).area, area);
+  assert.match(await page.textContent('#notice'), /One threat was added\. The scenario keeps its area\. Zones of the map that lie elsewhere are left out: 1\./);
+  await page.click('#notice >> text=Take the area of the map');
+  await page.waitForFunction(() => /The area is that of the map/.test(document.getElementById('notice').textContent));
+  const wider = (await document_(page)).area;
+  assert.ok(wider.min.lat <= area.min.lat && wider.max.lon >= area.max.lon, JSON.stringify(wider));
+  await page.click('#undo');
+  assert.deepEqual((await document_(page)).area, area);
+  await page.done();
+});
+
 test('a file that is no scenario is refused in words, and leaves the page as it was', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);

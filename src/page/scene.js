@@ -291,11 +291,11 @@ export class World {
     return this.#raycaster.ray;
   }
 
-  /** The view as a PNG. */
+  /** The view as a PNG, with its names, which are no part of the canvas. */
   async picture() {
-    this.#run = 0;
-    this.#render();
-    return new Promise((done) => { this.canvas.toBlob(done, 'image/png'); });
+    const canvas = document.createElement('canvas');
+    this.copy(canvas);
+    return new Promise((done) => { canvas.toBlob(done, 'image/png'); });
   }
 
   /** The view as it is, with its names, onto another canvas. */

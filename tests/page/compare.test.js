@@ -291,6 +291,34 @@ test('a plan is taken away: formats, scenario, picture, link', async () => {
   await page.done();
 });
 
+test('the picture of the scene has its names', async () => {
+  const page = await open(chrome, `${site.url}#plan=${await made(site.url, SMALL)}`);
+  await page.waitForSelector('.verdict');
+  await settled(page);
+  const canvas = await page.locator('#canvas').boundingBox();
+  const name = await page.locator('#labels .threat').boundingBox();
+  const [download] = await Promise.all([page.waitForEvent('download'), page.click('#save-picture')]);
+  const picture = `data:image/png;base64,${readFileSync(await download.path()).toString('base64')}`;
+  const box = { left: name.x - canvas.x, top: name.y - canvas.y, width: name.width, height: name.height, of: canvas.width };
+  const eye = await page.context().newPage();
+  const inked = await eye.evaluate(async ([data, { left, top, width, height, of }, wanted]) => {
+    const image = new Image();
+    image.src = data;
+    await image.decode();
+    const pen = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    pen.drawImage(image, 0, 0);
+    const k = image.width / of;
+    const seen = pen.getImageData(left * k, top * k, width * k, height * k).data;
+    const want = [1, 3, 5].map((at) => parseInt(wanted.slice(at, at + 2), 16));
+    let count = 0;
+    for (let at = 0; at < seen.length; at += 4) if (want.every((value, part) => Math.abs(seen[at + part] - value) <= 24)) count += 1;
+    return count;
+  }, [picture, box, await color(page, 'ink')]);
+  await eye.close();
+  assert.ok(inked > 20, `${inked} pixels of letters where the page has the name`);
+  await page.done();
+});
+
 test('a map becomes a flight plan, in every format that flies', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);

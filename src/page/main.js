@@ -243,9 +243,9 @@ function result(plan) {
   showResult(by('result'), { result: plan.result, scenario: plan.scenario, status: plan.ended ? plan.status : null, refusal: plan.refusal, geodetic: isGeodetic(plan.scenario) }, {
     markLeg: (k) => stage.markLeg(k),
     place: (violation) => stage.place(violation),
-    save: (format) => attempt(() => saveFrom(`/plans/${plan.id}/result?format=${format.name}`, fileName(plan.scenario.name, format.file))),
-    saveScenario: () => attempt(() => saveFrom(`/plans/${plan.id}/scenario`, fileName(plan.scenario.name, 'json'))),
-    savePicture: world && (() => attempt(async () => saveBlob(await world.picture(), fileName(plan.scenario.name, 'png')))),
+    save: (format) => attempt(() => saveFrom(`/plans/${plan.id}/result?format=${format.name}`, fileName(plan, 'result', format.file), format.name === 'json')),
+    saveScenario: () => attempt(() => saveFrom(`/plans/${plan.id}/scenario`, fileName(plan, 'scenario', 'json'))),
+    savePicture: world && (() => attempt(async () => saveBlob(await world.picture(), fileName(plan, 'view', 'png')))),
     copyLink: () => attempt(async () => {
       remember();
       tell(await copyLink(), 'note');

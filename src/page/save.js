@@ -12,11 +12,14 @@ export function saveBlob(blob, name) {
   setTimeout(() => URL.revokeObjectURL(address), 10000);
 }
 
-/** What the service answers, as a file of the name that it gives: by a request of ours, for a link could not bring a key. */
-export async function saveFrom(path, name) {
+/**
+ * What the service answers, as a file of the name that it gives, or else of this one, or of this one `anyway`: by a request of ours, for a
+ * link could not bring a key.
+ */
+export async function saveFrom(path, name, anyway = false) {
   const answer = await send(path);
   const [, given] = answer.headers.get('content-disposition')?.match(/filename="([^"]+)"/) ?? [];
-  saveBlob(await answer.blob(), given ?? name);
+  saveBlob(await answer.blob(), anyway ? name : given ?? name);
 }
 
 /** Puts the address of what is shown into the clipboard, which a page has none of over plain HTTP. Returns what to say of it. */
@@ -29,8 +32,8 @@ export async function copyLink() {
   }
 }
 
-/** A scenario's name as that of a file. */
-export function fileName(name, extension) {
-  const plain = (name ?? '').toLowerCase().normalize('NFKD').replace(/[^a-z0-9]+/g, '-').replace(/^-+|-+$/g, '').slice(0, 60);
-  return `${plain || 'plan'}.${extension}`;
+/** A file's name that says of which plan it is, and `what` of it: the service tells plans apart by the ends of their ids, too. */
+export function fileName({ id, scenario }, what, extension) {
+  const plain = (scenario.name ?? '').toLowerCase().normalize('NFKD').replace(/[^a-z0-9]+/g, '-').replace(/^-+|-+$/g, '').slice(0, 60);
+  return `${plain || 'plan'}-${id.slice(-8)}-${what}.${extension}`;
 }

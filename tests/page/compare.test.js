@@ -273,8 +273,13 @@ test('a plan is taken away: formats, scenario, picture, link', async () => {
     assert.match(saved.name, new RegExp(`^small.*\\.${format}$`));
     assert.deepEqual(saved.bytes, await served(`/plans/${id}/result?format=${format}`), format);
   }
-  assert.deepEqual((await save('#save-scenario')).bytes, await served(`/plans/${id}/scenario`));
+  const scenario = await save('#save-scenario');
+  assert.deepEqual(scenario.bytes, await served(`/plans/${id}/scenario`));
   const picture = await save('#save-picture');
+  // Each says of which plan it is, and what of it.
+  assert.equal(scenario.name, `small-${id.slice(-8)}-scenario.json`);
+  assert.equal((await save('[data-format=json]')).name, `small-${id.slice(-8)}-result.json`);
+  assert.equal(picture.name, `small-${id.slice(-8)}-view.png`);
   assert.equal(picture.bytes.subarray(1, 4).toString(), 'PNG');
   assert.ok(picture.bytes.length > 5000, 'and it is not empty');
   await page.click('#copy-link');

@@ -29,7 +29,7 @@ import { begunWith, nameShown, named, onStep, stepFrom } from './steps.js';
 import { Strip } from './strip.js';
 import { turn } from './tabs.js';
 import { Tools } from './tools.js';
-import { onUndoKeys } from './undo.js';
+import { offerUndo } from './undo.js';
 import { guard, isKept, keep } from './unsaved.js';
 import { faultText, placeText } from './words.js';
 
@@ -128,8 +128,6 @@ checkAsItChanges(draft, editor, stage);
 guard(draft);
 draft.addEventListener('change', () => {
   by('plan').disabled = false;
-  by('undo').disabled = !draft.canUndo;
-  by('redo').disabled = !draft.canRedo;
   by('stale').hidden = !stage.plan || draft.document === planned;
   by('title').textContent = draft.document.name ?? '';
   document.title = draft.document.name ? `${draft.document.name} · Noctule` : 'Noctule';
@@ -384,12 +382,9 @@ onStep(() => draft.document, ({ hash, own, draft: before }) => attempt(async () 
 by('plan').addEventListener('click', () => attempt(() => submit(false)));
 by('replan').addEventListener('click', () => attempt(() => submit(true)));
 by('cancel').addEventListener('click', () => stage.plan.status?.cancel_requested || attempt(() => stage.plan.cancel()));
-const undo = () => stage.tools?.takeBack() || draft.undo();
-by('undo').addEventListener('click', undo);
-by('redo').addEventListener('click', () => draft.redo());
+offerUndo(draft, () => stage.tools);
 
 by('plans').addEventListener('turned', () => plans.look(true));
-onUndoKeys({ undo, redo: () => draft.redo() });
 onDrop((file) => attempt(() => openFile(file)));
 onPrint(world);
 

@@ -1,9 +1,24 @@
-// The keys that undo and redo.
+// The buttons and the keys that undo and redo.
+
+import { by } from './dom.js';
 
 const TEXT = 'input[type=text], input[type=password]';
 
-/** Has them call `undo()` and `redo()`, except where the browser's own take back letters. */
-export function onUndoKeys({ undo, redo }) {
+/** Has them take back and do again changes of `draft`, and first take back what `tools()` are drawing. */
+export function offerUndo(draft, tools) {
+  const undo = () => tools()?.takeBack() || draft.undo();
+  const redo = () => draft.redo();
+  by('undo').addEventListener('click', undo);
+  by('redo').addEventListener('click', redo);
+  onKeys({ undo, redo });
+  draft.addEventListener('change', () => {
+    by('undo').disabled = !draft.canUndo;
+    by('redo').disabled = !draft.canRedo;
+  });
+}
+
+/** Has the keys call `undo()` and `redo()`, except where the browser's own take back letters. */
+function onKeys({ undo, redo }) {
   let before = null;
   addEventListener('focusin', ({ target }) => { before = target.value; });
   addEventListener('keydown', (event) => {

@@ -39,9 +39,9 @@ export class Refused extends Said {
 
 /**
  * The answer to a request; throws `Refused` for one that is none, and asks for a key where one is needed. What is
- * done on the `quiet` does not ask again after a no.
+ * done on the `quiet` does not ask again after a no. `progress(share)` hears how much of a long body has been sent.
  */
-export async function send(path, { method = 'GET', body, type = 'application/json', headers = {}, signal, quiet = false } = {}) {
+export async function send(path, { method = 'GET', body, type = 'application/json', headers = {}, signal, quiet = false, progress } = {}) {
   for (;;) {
     const used = key;
     const answer = await reach(path, {
@@ -53,7 +53,7 @@ export async function send(path, { method = 'GET', body, type = 'application/jso
         ...(used ? { authorization: `Bearer ${used}` } : {}),
         ...headers,
       },
-    });
+    }, progress);
     if (answer.ok) return answer;
     const problem = await answer.json().catch(() => null);
     if (answer.status !== 401) throw new Refused(answer.status, problem);
@@ -70,12 +70,28 @@ export async function send(path, { method = 'GET', body, type = 'application/jso
 }
 
 /** Each browser has words of its own for a fetch that failed. */
-async function reach(path, options) {
+async function reach(path, options, progress) {
   try {
-    return await fetch(path, options);
+    return await (progress ? watched(path, options, progress) : fetch(path, options));
   } catch (error) {
     throw error instanceof TypeError ? new Unreachable() : error;
   }
+}
+
+/** What `fetch` does, which does not tell how much has been sent. */
+function watched(path, { method, headers, body, signal }, progress) {
+  return new Promise((done, failed) => {
+    const request = new XMLHttpRequest();
+    request.open(method, path);
+    for (const [name, value] of Object.entries(headers)) request.setRequestHeader(name, value);
+    request.responseType = 'blob';
+    request.upload.addEventListener('progress', ({ loaded, total }) => progress(total ? loaded / total : 1));
+    request.addEventListener('load', () => done(new Response(request.response, { status: request.status })));
+    request.addEventListener('error', () => failed(new TypeError('no answer')));
+    request.addEventListener('abort', () => failed(new DOMException('given up', 'AbortError')));
+    signal?.addEventListener('abort', () => request.abort());
+    request.send(body);
+  });
 }
 
 /** The service says how a program sends a key; a person is asked for one. */

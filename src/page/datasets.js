@@ -4,7 +4,7 @@ import { ask } from './api.js';
 
 const CHOICES = '[data-pointer="/terrain"], [data-pointer="/terrain/name"]';
 
-/** Tells `editor` of them now, whenever the page is seen again, and when one is about to be chosen. Returns what looks again. */
+/** Tells `editor` of them whenever the page is seen again, and when one is about to be chosen. Returns what looks at once. */
 export function offerDatasets(editor) {
   let looking = null;
   const look = () => {
@@ -15,6 +15,5 @@ export function offerDatasets(editor) {
   };
   document.addEventListener('visibilitychange', () => document.hidden || look());
   for (const event of ['focusin', 'pointerdown']) editor.root.addEventListener(event, ({ target }) => { if (target.matches(CHOICES)) look(); });
-  look();
   return look;
 }

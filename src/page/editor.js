@@ -184,7 +184,7 @@ export class Editor {
       el('option', { value: '' }, 'Choose…'),
       this.#menu.scenarios.map(({ name, title }) => el('option', { value: name }, title)));
     choose.value = this.#chosen;
-    const file = el('input', { type: 'file', class: 'unseen', id: 'file', accept: '.json,.geojson,.kml,.plan,.txt,.air,.openair,application/json,application/geo+json,application/vnd.google-earth.kml+xml,text/plain',
+    const file = el('input', { type: 'file', class: 'unseen', id: 'file', accept: '.json,.geojson,.kml,.plan,.txt,.air,.openair,.tif,.tiff,.asc,.hgt,.gz,application/json,application/geo+json,application/vnd.google-earth.kml+xml,text/plain',
       onchange: () => {
         if (file.files[0]) this.acts.open(file.files[0]);
         file.value = '';

@@ -10,7 +10,7 @@ const REASONS = 5;
 /** How far from start and target the service looks for zones at least, and at most. */
 const LEAST_M = 1000;
 const MOST_M = 100000;
-const CAN_BE_OPENED = 'What can be opened: scenarios in JSON, GeoJSON, KML, plans of QGroundControl, and maps of airspace (OpenAir, ED-269, ED-318).';
+const CAN_BE_OPENED = 'What can be opened: scenarios in JSON, GeoJSON, KML, plans of QGroundControl, maps of airspace (OpenAir, ED-269, ED-318), and elevations (.tif, .asc, .hgt).';
 
 /**
  * The document in a file, and what there is to say about it. A map without start and target is laid over `open`, the document that is

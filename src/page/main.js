@@ -31,6 +31,7 @@ import { turn } from './tabs.js';
 import { Tools } from './tools.js';
 import { offerUndo } from './undo.js';
 import { guard, isKept, keep } from './unsaved.js';
+import { asGround } from './upload.js';
 import { faultText, placeText } from './words.js';
 
 const draft = new Draft();
@@ -75,14 +76,11 @@ const again = new Again(by('watch'), (iteration, trail) => {
 const editor = new Editor(by('scenario'), draft, {
   load: (name) => attempt(() => load(name)),
   open: (file) => attempt(() => openFile(file)),
-  blank: (inDegrees) => {
-    wishes += 1;
-    stepFrom(draft.document);
-    begin(inDegrees ? emptyInDegrees(draft.document, stage.frame) : EMPTY);
-  },
+  blank: (inDegrees) => anew(inDegrees ? emptyInDegrees(draft.document, stage.frame) : EMPTY),
   select: (index) => stage.selected !== index && stage.select(index),
   ...additions(draft, stage),
 });
+const datasets = offerDatasets(editor);
 const plans = new Plans(by('plans'), {
   open: (status) => attempt(() => open(status.id)),
   compare: (status, yes) => attempt(() => compare(status.id, yes, status.name)),
@@ -104,6 +102,12 @@ async function load(scenario, step = true) {
   editor.from(scenario);
 }
 
+function anew(document_) {
+  wishes += 1;
+  stepFrom(draft.document);
+  begin(document_);
+}
+
 function begin(document_, plan = null, kept = true) {
   // What was laid over one scenario says nothing of another.
   if (!plan) clearCompared();
@@ -115,6 +119,7 @@ function begin(document_, plan = null, kept = true) {
 }
 
 async function openFile(file) {
+  if (await asGround(file, draft, { datasets, begin: anew })) return;
   wishes += 1;
   const wish = wishes;
   const { document: read, note, area } = await readFile(file, draft.document ?? {});
@@ -440,4 +445,4 @@ async function start() {
 showNone();
 stage.drawSearch();
 await start();
-offerDatasets(editor);
+datasets();

@@ -16,15 +16,31 @@ const EDGE = 0.027;
 /** A scenario in degrees with nothing in it, where `document` is, whose places `frame` turns to metres. */
 export function emptyInDegrees(document, frame) {
   const { lat, lon } = isGeodetic(document) && frame ? middleOf(document, frame) : SOMEWHERE;
+  return emptyAround({ lat, lon, alt: 50 }, { kind: 'flat', elevation: 0 });
+}
+
+/** The same over a dataset, in the middle of it and above all of it. */
+export function emptyOver({ name, area: { min, max }, max: highest }) {
+  const wide = max.lon - min.lon + (max.lon < min.lon ? 360 : 0);
+  // Not to its last sample: places are written in so many digits.
+  const edge = { lat: 0.49 * (max.lat - min.lat), lon: 0.49 * wide };
+  const middle = { lat: (min.lat + max.lat) / 2, lon: min.lon + wide / 2, alt: Math.ceil(highest ?? 0) + 50 };
+  return emptyAround(middle, { kind: 'dataset', name }, edge);
+}
+
+/** Within `most` degrees to each side of a place. */
+function emptyAround({ lat, lon, alt }, terrain, most = { lat: EDGE, lon: 180 }) {
   const stretch = 1 / Math.max(0.01, Math.cos((lat * Math.PI) / 180));
   const empty = { name: 'untitled', frame: 'wgs84', altitude_datum: 'msl' };
-  const place = (off, alt) => {
-    const beside = lon + off * stretch;
-    return written(empty, { lat: lat + off, lon: beside - 360 * Math.round(beside / 360), alt });
+  const edge = { lat: Math.min(EDGE, most.lat), lon: Math.min(EDGE * stretch, most.lon) };
+  const away = { lat: Math.min(AWAY, edge.lat / 4), lon: Math.min(AWAY * stretch, edge.lon / 4) };
+  const place = (off, side, height) => {
+    const beside = lon + side * off.lon;
+    return written(empty, { lat: lat + side * off.lat, lon: beside - 360 * Math.round(beside / 360), alt: height });
   };
   return {
-    ...empty, start: place(-AWAY, 50), target: place(AWAY, 50), area: { min: place(-EDGE), max: place(EDGE) },
-    threats: [], terrain: { kind: 'flat', elevation: 0 }, altitude: { min: 20, max: 120 },
+    ...empty, start: place(away, -1, alt), target: place(away, 1, alt), area: { min: place(edge, -1), max: place(edge, 1) },
+    threats: [], terrain, altitude: { min: 20, max: 120 },
   };
 }
 

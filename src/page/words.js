@@ -21,6 +21,12 @@ export function placeText({ distance, z, ground }) {
   return `${metres(distance, 0)}: ${number(z, 0)} m${above}`;
 }
 
+/** A length of a file. */
+export function bytes(count) {
+  const [power, unit] = count >= 1e9 ? [1e9, 'GB'] : count >= 1e6 ? [1e6, 'MB'] : [1e3, 'kB'];
+  return `${number(count / power)} ${unit}`;
+}
+
 /** A cost: four or five significant figures. */
 export const cost = (value) => number(value, value >= 1e5 ? 0 : value >= 1000 ? 1 : 2);
 

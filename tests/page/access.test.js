@@ -7,6 +7,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
+import { fileURLToPath } from 'node:url';
 import { SMALL, WALLED, FIRST, drawn, made, open, plan, scene, service } from './support.js';
 import { chrome, site } from './together.js';
 
@@ -144,6 +145,37 @@ test('a service with keys is asked with one, kept in memory, and followed with t
   await page.waitForSelector('#key[open]');
   await page.done();
   rmSync(directory, { recursive: true, force: true });
+});
+
+test('elevations are uploaded only with a key that may', async (t) => {
+  const directory = mkdtempSync(join(tmpdir(), 'noctule-keys-'));
+  t.after(() => rmSync(directory, { recursive: true, force: true }));
+  const [reader, planner] = ['read', 'plan'].map((scope) => spawnSync(process.env.NOCTULE_BIN, ['key', 'new', '--name', scope, '--scopes', scope], { encoding: 'utf8', cwd: directory }));
+  writeFileSync(join(directory, 'keys.toml'), `${reader.stdout}\n${planner.stdout}`);
+  const guarded = await service('--keys-file', join(directory, 'keys.toml'));
+  t.after(guarded.stop);
+  const file = fileURLToPath(new URL('../../scenarios/terrain/jacksboro.tif', import.meta.url));
+  for (const key of [reader, planner]) {
+    const page = await open(chrome, 'about:blank');
+    page.allowed = /status of 403/;
+    await page.goto(guarded.url);
+    await page.fill('#key-field', key.stderr.trim().split('\n').at(-1));
+    await page.keyboard.press('Enter');
+    await drawn(page, FIRST);
+    await page.setInputFiles('#file', file);
+    if (key === reader) {
+      await page.waitForFunction(() => /jacksboro\.tif is not uploaded: this key may look at plans and datasets, but may upload none/.test(document.getElementById('notice').textContent));
+    } else {
+      await page.waitForSelector('#upload[open]');
+      assert.deepEqual(await serious(page), []);
+      // Another's dataset is refused where it is named.
+      await page.click('#upload-yes');
+      await page.click('text=Replace it');
+      await page.waitForFunction(() => /somebody else’s, and this key may not replace it/.test(document.getElementById('upload-fault').textContent));
+    }
+    assert.equal(await page.evaluate(() => document.getElementById('upload').open), key === planner);
+    await page.done();
+  }
 });
 
 test('without WebGL the form, the strip and the tables have everything', async () => {

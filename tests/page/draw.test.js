@@ -5,7 +5,7 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { SMALL, ask, FIRST, document_, drawn, drop, fill, groundPoint, open, scene, service, settled } from './support.js';
+import { SMALL, ask, FIRST, document_, drawn, drop, fill, groundPoint, held, open, scene, service, settled } from './support.js';
 import { chrome, site } from './together.js';
 
 test('a shipped scenario is there at once, and another is one choice away', async () => {
@@ -460,6 +460,64 @@ test('datasets that come and go meanwhile are offered when one is chosen, and wh
   await page.click('[data-pointer="/terrain/name"]');
   await offers(['jacksboro', 'third', 'second, which is not there']);
   assert.equal(await page.inputValue('[data-pointer="/terrain/name"]'), 'second', `${await offered()}`);
+  await page.done();
+});
+
+test('a file of elevations becomes a dataset, and the ground of what is open', async (t) => {
+  const own = await service();
+  t.after(own.stop);
+  const page = await open(chrome, own.url);
+  await drawn(page, FIRST);
+  await page.click('#empty-in-degrees');
+  await drawn(page, 0);
+  // By a drop: with a name that is taken, then without a reference system.
+  const grid = 'ncols 3\nnrows 3\nxllcorner 500000\nyllcorner 4000000\ncellsize 30\n1 2 3\n4 5 6\n7 8 9\n';
+  await drop(page, 'Jacksboro.asc', grid, '');
+  await page.waitForSelector('#upload[open]');
+  assert.equal(await page.inputValue('#upload-name'), 'jacksboro');
+  await page.keyboard.press('Enter');
+  await page.waitForFunction(() => /There is a dataset “jacksboro” already/.test(document.getElementById('upload-fault').textContent));
+  assert.equal(await page.textContent('#upload-yes'), 'Replace it');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'upload-name');
+  await page.keyboard.press('Enter');
+  assert.match(await page.textContent('#upload-fault'), /already/, 'Enter replaces nothing');
+  await page.fill('#upload-name', 'Small hills');
+  assert.equal(await page.textContent('#upload-yes'), 'Upload');
+  await page.keyboard.press('Enter');
+  await page.waitForFunction(() => /lower-case/.test(document.getElementById('upload-fault').textContent));
+  await page.fill('#upload-name', 'hills');
+  await page.keyboard.press('Enter');
+  await page.waitForFunction(() => /names no coordinate reference system/.test(document.getElementById('upload-fault').textContent));
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'upload-crs');
+  assert.equal(await page.evaluate(() => document.activeElement.getAttribute('aria-invalid')), 'true');
+  await page.keyboard.type('EPSG:32616');
+  await page.keyboard.press('Enter');
+  await page.waitForSelector('#upload:not([open])', { state: 'attached' });
+  await page.waitForFunction(() => /“hills” is a dataset of the service now, and the ground of this scenario/.test(document.getElementById('notice').textContent));
+  assert.deepEqual((await document_(page)).terrain, { kind: 'dataset', name: 'hills' });
+  assert.equal((await ask(own.url, '/terrains/hills')).crs, 'EPSG:32616');
+  await page.click('summary:text-is("Ground")');
+  assert.equal(await page.inputValue('[data-pointer="/terrain/name"]'), 'hills', 'and it is in the choice');
+  // By its field, over a scenario in metres, which begins another one.
+  await page.selectOption('#source', 'paper-1');
+  await drawn(page, 3);
+  const file = fileURLToPath(new URL('../../scenarios/terrain/jacksboro.tif', import.meta.url));
+  await page.setInputFiles('#file', file);
+  await page.fill('#upload-name', 'ridge');
+  await page.click('#upload-yes');
+  await page.click('#notice >> text=Begin one there');
+  await page.waitForFunction(() => globalThis.noctule.document().terrain.name === 'ridge' && globalThis.noctule.scene().ground.columns === 201);
+  assert.ok(await page.isHidden('.faults'), 'it can be planned as it is drawn');
+  // Given up while it is being sent, nothing has happened.
+  await held(page, '**/terrains/never');
+  await page.setInputFiles('#file', file);
+  await page.fill('#upload-name', 'never');
+  await page.click('#upload-yes');
+  await page.waitForFunction(() => /sent/.test(document.getElementById('upload-said').textContent));
+  assert.ok(await page.isVisible('#upload-progress') && await page.isDisabled('#upload-yes'));
+  await page.click('#upload-no');
+  await page.waitForSelector('#upload:not([open])', { state: 'attached' });
+  assert.deepEqual((await ask(own.url, '/terrains')).terrains.map(({ name }) => name), ['hills', 'jacksboro', 'ridge']);
   await page.done();
 });
 

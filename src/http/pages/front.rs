@@ -69,7 +69,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 57] = [
+static FILES: [File; 58] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -121,6 +121,7 @@ static FILES: [File; 57] = [
     file!("turns.js"),
     file!("undo.js"),
     file!("unsaved.js"),
+    file!("upload.js"),
     file!("volumes.js"),
     file!("way.js"),
     file!("words.js"),

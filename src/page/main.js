@@ -387,14 +387,14 @@ onStep(() => draft.document, ({ hash, own, draft: before }) => attempt(async () 
 by('plan').addEventListener('click', () => attempt(() => submit(false)));
 by('replan').addEventListener('click', () => attempt(() => submit(true)));
 by('cancel').addEventListener('click', () => stage.plan.status?.cancel_requested || attempt(() => stage.plan.cancel()));
-offerUndo(draft, () => stage.tools);
+const showUndo = offerUndo(draft, () => stage.tools);
 
 by('plans').addEventListener('turned', () => plans.look(true));
 onDrop((file) => attempt(() => openFile(file)));
 onPrint(world);
 
 if (world) {
-  stage.tools = new Tools({ bar: by('tools'), hint: by('hint'), world, draft, stage, pointed: (pixel) => stage.pointAt(pixel) });
+  stage.tools = new Tools({ bar: by('tools'), hint: by('hint'), world, draft, stage, pointed: (pixel) => stage.pointAt(pixel), changed: showUndo });
   stage.exaggerate = cameraOf(world);
   world.lapsed = (yes) => stage.tools.say(yes ? 'The browser has let go of the scene, and draws it again as soon as it can. Form, strip and tables have everything.' : null);
 }

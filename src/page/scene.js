@@ -37,6 +37,8 @@ export class World {
   #mark = new Dots('mark', 15);
   #faults = new Dots('faults', 20);
   #handles = new Dots('handles', 13);
+  /** Of a polygon that is being drawn: the sides that it has, and those that it would get. */
+  #sketch = { sides: new RouteLine('sides', '#ffffff', 3.5), band: new RouteLine('band', '#ffffff', 2) };
   #ends = { start: new Dots('start', 16), target: new Dots('target', 16) };
   #raycaster = new Raycaster();
   #asked = false;
@@ -66,7 +68,7 @@ export class World {
     this.controls.enableDamping = !matchMedia('(prefers-reduced-motion: reduce)').matches;
     this.controls.addEventListener('change', () => this.#stir());
     this.#standing.add(this.#relief.group, this.#volumes.group);
-    this.#changing.add(this.#trail.group, this.#curtain.mesh, this.#waypoints.group, this.#mark.group, this.#faults.group, this.#handles.group, this.#ends.start.group, this.#ends.target.group);
+    this.#changing.add(this.#trail.group, this.#curtain.mesh, this.#waypoints.group, this.#mark.group, this.#faults.group, this.#sketch.sides.group, this.#sketch.band.group, this.#handles.group, this.#ends.start.group, this.#ends.target.group);
     this.#root.add(this.#standing, this.#changing);
     this.#scene.add(this.#root, this.#backdrop.mesh);
     new ResizeObserver(() => this.#resize()).observe(canvas.parentElement);
@@ -225,6 +227,15 @@ export class World {
   /** What can be dragged. */
   handles(places) {
     this.#handles.set(places, '#ffffff', this.colours.core);
+    this.wake();
+  }
+
+  /** What is being drawn: `sides` and `band` as lines of places. */
+  sketch(lines) {
+    for (const [name, line] of Object.entries(this.#sketch)) {
+      line.set(lines[name]);
+      line.paint(this.colours.core, 0.8);
+    }
     this.wake();
   }
 
@@ -388,6 +399,7 @@ export class World {
       mark: this.#mark.count,
       faults: this.#faults.count,
       handles: this.#handles.count,
+      sketch: { sides: this.#sketch.sides.points, band: this.#sketch.band.points },
       backdrop: this.#backdrop.mesh.visible,
       memory: { ...this.renderer.info.memory },
       frames: { ...this.#frames },

@@ -8,13 +8,15 @@ const NEAR_PX = 13;
 /** A finger covers what it is at. */
 const NEAR_TOUCH_PX = 24;
 const STILL_PX = 5;
+/** A side of what is being drawn lies on the ground in so many pieces. */
+const PIECES = 16;
 const TOOLS = [
   ['look', 'Look', 'Drag to turn, wheel to zoom. Drag start, target and the dots of a chosen threat to move them.', 'Drag to turn, pinch to zoom. Drag start, target and the dots of a chosen threat to move them.'],
   ['start', 'Start', 'Click on the ground to place the start.', 'Tap the ground to place the start.'],
   ['target', 'Target', 'Click on the ground to place the target.', 'Tap the ground to place the target.'],
   ['cylinder', 'Cylinder', 'Click on the ground to place a round threat; drag its dots for its radii.', 'Tap the ground to place a round threat; drag its dots for its radii.'],
   ['polygon', 'Polygon', 'Click the corners one after another; Enter, a double click or a click on the first one closes it, Ctrl+Z takes back the last one, Escape gives up.',
-    'Tap the corners one after another; a tap on the first one closes it, Look gives up.'],
+    'Tap the corners one after another; a tap on the first one closes it, Undo takes back the last one, Look gives up.'],
 ];
 /** What a tool says, to fingers or to a mouse. */
 const help = ([, , mouse, touch]) => (matchMedia('(pointer: coarse)').matches ? touch : mouse);
@@ -24,12 +26,17 @@ export class Tools {
   #down = null;
   #drag = null;
   #corners = [];
+  /** The place under the mouse, where another corner would be. */
+  #next = null;
   #drags = 0;
   #buttons = new Map();
 
-  /** `stage` has `frame`, `ground` and `selected`, and `select(index)`; `pointed(place)` hears where the pointer is. */
-  constructor({ bar, hint, world, draft, stage, pointed }) {
-    Object.assign(this, { hint, world, draft, stage, pointed });
+  /**
+   * `stage` has `frame`, `ground` and `selected`, and `select(index)`; `pointed(place)` hears where the pointer is, and `changed()` that
+   * something is being drawn or no longer.
+   */
+  constructor({ bar, hint, world, draft, stage, pointed, changed }) {
+    Object.assign(this, { hint, world, draft, stage, pointed, changed });
     for (const tool of TOOLS) {
       const [name, title] = tool;
       const button = el('button', { type: 'button', data: { tool: name }, 'aria-pressed': String(name === 'look'), title: help(tool), onclick: () => this.use(name) }, title);
@@ -41,7 +48,10 @@ export class Tools {
     canvas.addEventListener('pointermove', (event) => this.#moved(event));
     canvas.addEventListener('pointerup', (event) => this.#released(event));
     canvas.addEventListener('pointercancel', () => this.#drop());
-    canvas.addEventListener('pointerleave', () => pointed(null));
+    canvas.addEventListener('pointerleave', () => {
+      pointed(null);
+      this.#wouldBe(null);
+    });
     addEventListener('keydown', (event) => {
       if (event.key === 'Escape') this.use('look');
       if (event.key === 'Enter' && this.#tool === 'polygon' && !event.target.closest?.('button, input, select')) this.#close();
@@ -51,11 +61,15 @@ export class Tools {
   use(tool) {
     this.#tool = tool;
     this.#corners = [];
+    this.#next = null;
     for (const [name, button] of this.#buttons) button.setAttribute('aria-pressed', String(name === tool));
     this.say(null);
     this.world.canvas.dataset.tool = tool;
     this.show();
   }
+
+  /** Whether there is a corner to take back. */
+  get drawing() { return this.#corners.length > 0; }
 
   /** Takes back the last corner of what is being drawn; says whether there was one. */
   takeBack() {
@@ -72,9 +86,38 @@ export class Tools {
     this.hint.hidden = !text && this.#tool === 'look';
   }
 
-  /** Draws what can be dragged. */
+  /** Draws what can be dragged, and what is being drawn. */
   show() {
     this.world.handles([...this.#handles().map((handle) => handle.place), ...this.#corners]);
+    this.#sketch();
+    this.changed();
+  }
+
+  /** The sides between the corners there are; and as a band those to the next one and back to the first, or the one that closes it. */
+  #sketch() {
+    const corners = this.#corners;
+    const ends = this.#next ? [this.#next] : corners.length > 2 ? [] : null;
+    const band = corners.length && ends ? [corners.at(-1), ...ends, ...(corners.length > 1 ? [corners[0]] : [])] : [];
+    this.world.sketch({ sides: this.#draped(corners), band: this.#draped(band) });
+  }
+
+  /** A line through places, as it lies on the ground. */
+  #draped(places) {
+    const { ground } = this.stage;
+    return places.slice(1).flatMap((b, k) => {
+      const a = places[k];
+      return Array.from({ length: PIECES + 1 }, (_, at) => {
+        const [x, y] = [a.x + ((b.x - a.x) * at) / PIECES, a.y + ((b.y - a.y) * at) / PIECES];
+        return { x, y, z: ground.at(x, y) };
+      }).slice(k ? 1 : 0);
+    });
+  }
+
+  /** Where the next corner would be; null where none would. */
+  #wouldBe(place) {
+    if (!this.#corners.length || (!place && !this.#next)) return;
+    this.#next = place;
+    this.#sketch();
   }
 
   /** Dots of the threat that is chosen: its middle and its radii, or its corners. */
@@ -155,7 +198,10 @@ export class Tools {
       if (at) this.#drag.move({ x: at.x + this.#drag.dx, y: at.y + this.#drag.dy });
       return;
     }
-    if (!event.buttons) this.pointed({ x: event.offsetX, y: event.offsetY });
+    if (event.buttons) return;
+    this.pointed({ x: event.offsetX, y: event.offsetY });
+    // A finger that is not on the glass is nowhere.
+    if (this.#corners.length && event.pointerType !== 'touch') this.#wouldBe(this.world.onGround(event.offsetX, event.offsetY));
   }
 
   #released(event) {
@@ -191,6 +237,7 @@ export class Tools {
       else if (last && Math.hypot(last.x - px, last.y - py) <= STILL_PX) this.#close();
       else {
         this.#corners.push(place);
+        this.#next = null;
         this.show();
       }
       return;

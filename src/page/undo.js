@@ -4,17 +4,19 @@ import { by } from './dom.js';
 
 const TEXT = 'input[type=text], input[type=password]';
 
-/** Has them take back and do again changes of `draft`, and first take back what `tools()` are drawing. */
+/** Has them take back and do again changes of `draft`, and first take back what `tools()` are drawing. Returns what shows whether the buttons can. */
 export function offerUndo(draft, tools) {
   const undo = () => tools()?.takeBack() || draft.undo();
   const redo = () => draft.redo();
   by('undo').addEventListener('click', undo);
   by('redo').addEventListener('click', redo);
   onKeys({ undo, redo });
-  draft.addEventListener('change', () => {
-    by('undo').disabled = !draft.canUndo;
+  const show = () => {
+    by('undo').disabled = !draft.canUndo && !tools()?.drawing;
     by('redo').disabled = !draft.canRedo;
-  });
+  };
+  draft.addEventListener('change', show);
+  return show;
 }
 
 /** Has the keys call `undo()` and `redo()`, except where the browser's own take back letters. */

@@ -5,7 +5,7 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { SMALL, ask, FIRST, document_, drawn, drop, fill, groundPoint, held, open, scene, service, settled } from './support.js';
+import { SMALL, ask, color, FIRST, document_, drawn, drop, fill, groundPoint, held, open, pixels, scene, service, settled } from './support.js';
 import { chrome, site } from './together.js';
 
 test('a shipped scenario is there at once, and another is one choice away', async () => {
@@ -338,6 +338,37 @@ test('a double click closes a polygon, and two corners are none', async () => {
   await page.mouse.dblclick(places[2].x, places[2].y);
   await drawn(page, 1);
   assert.equal((await document_(page)).threats[0].vertices.length, 3);
+  await page.done();
+});
+
+test('a polygon that is being drawn shows its sides, and those that it would get', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await page.click('text=Empty');
+  await drawn(page, 0);
+  const points = async () => (await scene(page)).sketch;
+  await page.click('[data-tool=polygon]');
+  const places = [];
+  for (const [x, y] of [[-400, 200], [-250, 200], [-250, 350], [-400, 350]]) places.push(await groundPoint(page, x, y));
+  await page.mouse.click(places[0].x, places[0].y);
+  assert.deepEqual(await points(), { sides: 0, band: 0 });
+  await page.mouse.move(places[1].x, places[1].y);
+  assert.deepEqual(await points(), { sides: 0, band: 17 }, 'to the pointer');
+  await settled(page);
+  const core = await color(page, 'core');
+  const [a, b] = places;
+  assert.ok(await pixels(page, core, { x: (a.x + b.x) / 2 - 4, y: (a.y + b.y) / 2 - 6, width: 8, height: 12 }) > 4, 'and is seen');
+  await page.mouse.click(places[1].x, places[1].y);
+  await page.mouse.move(places[2].x, places[2].y);
+  assert.deepEqual(await points(), { sides: 17, band: 33 }, 'to the pointer and back to the first corner');
+  await page.mouse.click(places[2].x, places[2].y);
+  assert.deepEqual(await points(), { sides: 33, band: 17 }, 'what would close it');
+  await page.keyboard.press('Control+z');
+  assert.deepEqual(await points(), { sides: 17, band: 0 });
+  await page.mouse.click(places[2].x, places[2].y);
+  await page.keyboard.press('Enter');
+  await drawn(page, 1);
+  assert.deepEqual(await points(), { sides: 0, band: 0 });
   await page.done();
 });
 

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { FIRST, LONG, SMALL, WALLED, color, contrasts, document_, drawn, drop, fill, groundPoint, made, open, plan, settled } from './support.js';
+import { FIRST, LONG, SMALL, WALLED, color, contrasts, document_, drawn, drop, fill, groundPoint, made, open, plan, scene, settled } from './support.js';
 import { chrome, site } from './together.js';
 
 const PHONE = { viewport: { width: 360, height: 740 }, hasTouch: true, isMobile: true };
@@ -264,6 +264,27 @@ test('a finger takes hold of the start', async () => {
   assert.notDeepEqual((await document_(page)).start, before_);
   await page.click('[data-tool=polygon]');
   assert.match(await page.textContent('#hint'), /Tap the corners/);
+  await page.done();
+});
+
+test('a finger takes back the last corner of a polygon', async () => {
+  const page = await open(chrome, site.url, { viewport: { width: 800, height: 900 }, hasTouch: true });
+  await drawn(page, FIRST);
+  assert.ok(await page.isDisabled('#undo'), 'nothing has been done yet');
+  await page.tap('[data-tool=polygon]');
+  await page.locator('#canvas').scrollIntoViewIfNeeded();
+  for (const [x, y] of [[-3000, -1000], [1000, -3000], [1000, 1000]]) {
+    const at = await groundPoint(page, x, y);
+    await page.touchscreen.tap(at.x, at.y);
+  }
+  assert.equal((await scene(page)).handles, 3);
+  await page.tap('#undo');
+  assert.equal((await scene(page)).handles, 2);
+  await page.tap('#undo');
+  await page.tap('#undo');
+  assert.equal((await scene(page)).handles, 0);
+  assert.ok(await page.isDisabled('#undo'));
+  assert.equal((await document_(page)).threats.length, FIRST);
   await page.done();
 });
 

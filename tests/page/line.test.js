@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { FIRST, LONG, SMALL, ask, drawn, drop, fill, open, wire } from './support.js';
+import { FIRST, LONG, SMALL, ask, drawn, drop, fill, held, open, wire } from './support.js';
 import { chrome, site } from './together.js';
 
 /** A plan that runs until it is stopped. */
@@ -64,6 +64,22 @@ test('a page that is not in sight leaves the connections to those that are, and 
   await pages[0].waitForSelector('.verdict');
   assert.ok(await points(pages[0]) > known);
   await context.close();
+});
+
+test('on a slow line the frame of the page is seen before what it is made with', async () => {
+  const page = await chrome.newPage({ viewport: { width: 1440, height: 900 } });
+  const release = await held(page, /\/page\/.*\.js$|uplot\.css$/);
+  page.goto(site.url).catch(() => {});
+  await page.waitForFunction(() => performance.getEntriesByName('first-contentful-paint').length === 1);
+  for (const text of ['Noctule', 'Scenario', 'Plans', 'Altitude', 'Search']) assert.ok(await page.locator(`text="${text}"`).first().isVisible(), text);
+  const scene_ = await page.locator('#scene').boundingBox();
+  assert.ok(scene_.width > 500 && scene_.height > 500, 'and where the scene will be');
+  const said = () => page.evaluate(() => [['scene', '::after'], ['scenario', '::before'], ['figures', '::before']].map(([id, at]) => getComputedStyle(document.getElementById(id), at).content));
+  assert.deepEqual(await said(), ['"Loading…"', '"Loading…"', '"Loading…"']);
+  await release();
+  await drawn(page, FIRST);
+  assert.deepEqual(await said(), ['none', 'none', 'none']);
+  await page.context().close();
 });
 
 test('a page that cannot begin says so, and begins when it is told to', async () => {

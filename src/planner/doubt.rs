@@ -5,9 +5,14 @@ use super::starts;
 use crate::cost::Model;
 use crate::geometry::Rect;
 
-/// Over level ground, the best route found is mostly the best there is if it costs no more than this share beyond what
-/// is proven. (Over hills the bound knows too little to tell.)
+/// The best route found is mostly the best there is if it costs no more than this share beyond what is proven. (Over hills
+/// the bound hardly ever proves so much.)
 const PROVEN: f64 = 0.05;
+
+/// Whether the best route of `log` costs little more than `lower`, which none costs less than.
+pub(super) fn is_proven(lower: f64, log: &Log) -> bool {
+    log.best.cost <= lower * (1.0 + PROVEN)
+}
 
 /// Whether over level ground the best route of `log` may be far from the best there is, given that none costs less than
 /// `lower`. No way is missed where no threat is near the straight one, and where single routes take long to price, nobody
@@ -18,7 +23,7 @@ pub(super) fn is_doubtful(model: &Model, lower: f64, log: &Log) -> bool {
     let straight = Rect::around(ends).expect("two points");
     let mut threats = scenario.threats.iter();
     scenario.terrain.is_flat()
-        && log.best.cost > lower * (1.0 + PROVEN)
+        && !is_proven(lower, log)
         && threats.any(|threat| threat.extent().meets(&straight))
         && !starts::is_vast(scenario)
 }

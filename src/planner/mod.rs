@@ -14,6 +14,7 @@ mod fewer;
 mod finish;
 mod guide;
 mod kept;
+mod kicks;
 mod log;
 mod moves;
 mod newton;
@@ -165,6 +166,9 @@ fn search_on(model: &Model, lower: f64, log: &mut Log) -> StopReason {
     }
     if goes_on(reason) && share_out::is_worthwhile(model, log) {
         reason = share_out::search(model, log);
+    }
+    if goes_on(reason) && kicks::is_worthwhile(model, lower, log) {
+        reason = kicks::search(model, log);
     }
     reason
 }

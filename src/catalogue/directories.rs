@@ -193,7 +193,9 @@ impl Catalogue for Directories {
     ) -> Result<(Kept, Entry), CatalogueError> {
         self.check_not_mounted(&naming.name)?;
         let (kept, record) = self.uploaded()?.keep(&file, naming, room)?;
-        Ok((kept, record.entry(&naming.name, file)))
+        let bytes = file.staged.bytes();
+        let entry = record.entry(&naming.name, bytes, file.metadata, file.survey);
+        Ok((kept, entry))
     }
 
     fn removable(&self, naming: &Naming) -> Result<String, CatalogueError> {

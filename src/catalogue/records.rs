@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::content::{Checked, Declaration};
 use super::{CatalogueError, Entry, Expected, Kept, Naming, Room};
-use crate::terrain::dem::Survey;
+use crate::terrain::dem::{Metadata, Survey};
 
 /// The stored record of a name.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -67,14 +67,14 @@ impl Name {
         }
     }
 
-    /// What is known about the dataset that it refers to.
-    pub(super) fn entry(self, name: &str, file: Checked) -> Entry {
+    /// What is known about the dataset of this `name`, whose content has so many `bytes`.
+    pub(super) fn entry(self, name: &str, bytes: u64, metadata: Metadata, survey: Survey) -> Entry {
         Entry {
             name: name.to_owned(),
             sha256: Some(self.sha256),
-            bytes: file.staged.bytes(),
-            metadata: file.metadata,
-            survey: Some(file.survey),
+            bytes,
+            metadata,
+            survey: Some(survey),
             uploaded_ms: Some(self.uploaded_ms),
             owner: self.owner,
         }

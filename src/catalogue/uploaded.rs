@@ -206,15 +206,8 @@ impl Uploads for Uploaded {
             let is_kept = self.state.lock().contents.contains_key(&record.sha256);
             if is_kept { error.into() } else { unknown() }
         })?;
-        Ok(Entry {
-            name: name.to_owned(),
-            sha256: Some(record.sha256),
-            bytes: content.bytes,
-            metadata: dataset.metadata().clone(),
-            survey: Some(content.survey()),
-            uploaded_ms: Some(record.uploaded_ms),
-            owner: record.owner,
-        })
+        let metadata = dataset.metadata().clone();
+        Ok(record.entry(name, content.bytes, metadata, content.survey()))
     }
 
     fn permit(&self, naming: &Naming, room: Room) -> Result<(), CatalogueError> {

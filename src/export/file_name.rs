@@ -1,17 +1,15 @@
-//! The file name of a downloaded plan.
-
-use super::Format;
+//! The file name of what is downloaded of a plan.
 
 /// Most characters of a scenario's name used in a file name.
 const LONGEST: usize = 60;
 
-/// The file name of a plan: the scenario's name in portable characters, a suffix that distinguishes the plan, and the
-/// format's extension.
+/// The scenario's name in portable characters, a suffix that distinguishes the plan, and an `ending`: what it is of the
+/// plan, and the extension.
 #[must_use]
-pub fn file_name(scenario: Option<&str>, plan: Option<&str>, format: &Format) -> String {
+pub fn file_name(scenario: Option<&str>, plan: Option<&str>, ending: &str) -> String {
     let name = slug(scenario.unwrap_or_default());
     let name = if name.is_empty() { "plan" } else { &name };
-    whole(name, plan, format)
+    whole(name, plan, ending)
 }
 
 /// The same with the letters of every script, where the scenario's name has others than those of ASCII.
@@ -19,16 +17,16 @@ pub fn file_name(scenario: Option<&str>, plan: Option<&str>, format: &Format) ->
 pub fn file_name_in_full(
     scenario: Option<&str>,
     plan: Option<&str>,
-    format: &Format,
+    ending: &str,
 ) -> Option<String> {
     let name = words(scenario?, char::is_alphanumeric);
-    (!name.is_ascii()).then(|| whole(&name, plan, format))
+    (!name.is_ascii()).then(|| whole(&name, plan, ending))
 }
 
-fn whole(name: &str, plan: Option<&str>, format: &Format) -> String {
+fn whole(name: &str, plan: Option<&str>, ending: &str) -> String {
     // The end of an id is its random part.
     let tail = plan.map(|id| format!("-{}", id.get(id.len().saturating_sub(8)..).unwrap_or(id)));
-    format!("{name}{}.{}", tail.unwrap_or_default(), format.extension)
+    format!("{name}{}{ending}", tail.unwrap_or_default())
 }
 
 /// Lower-case ASCII letters and digits, hyphens between.
@@ -53,7 +51,6 @@ mod tests {
 
     #[test]
     fn names_are_safe_everywhere() {
-        let kml = Format::named("kml").expect("a format");
         let id = Some("01936f2c-7d1a-7c55-9a53-27b1b44c1a10");
         for (name, id, expected) in [
             (Some("Ridge run, 2"), id, "ridge-run-2-b44c1a10.kml"),
@@ -62,14 +59,13 @@ mod tests {
             (Some("☂"), None, "plan.kml"),
             (None, id, "plan-b44c1a10.kml"),
         ] {
-            assert_eq!(file_name(name, id, kml), expected);
+            assert_eq!(file_name(name, id, ".kml"), expected);
         }
-        assert_eq!(file_name(Some(&"ab ".repeat(50)), None, kml).len(), 60 + 3);
+        assert_eq!(file_name(Some(&"ab ".repeat(50)), None, ".kml").len(), 60 + 3);
     }
 
     #[test]
     fn names_in_other_scripts_are_whole() {
-        let kml = Format::named("kml").expect("a format");
         let id = Some("01936f2c-7d1a-7c55-9a53-27b1b44c1a10");
         for (name, expected) in [
             (Some("Ridge run, 2"), None),
@@ -78,7 +74,7 @@ mod tests {
             (Some("☂"), None),
             (None, None),
         ] {
-            assert_eq!(file_name_in_full(name, id, kml).as_deref(), expected);
+            assert_eq!(file_name_in_full(name, id, ".kml").as_deref(), expected);
         }
     }
 }

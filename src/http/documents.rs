@@ -28,9 +28,19 @@ pub(super) async fn scenario(
     Id(id): Id,
     _: NoParams,
 ) -> Result<Response, Problem> {
-    caller.plan(&*state.store, id).await?;
+    let plan = caller.plan(&*state.store, id).await?;
     let document = state.store.scenario(id).await?;
-    Ok(([(header::CONTENT_TYPE, "application/json")], document).into_response())
+    let headers = [
+        (
+            header::CONTENT_TYPE,
+            HeaderValue::from_static("application/json"),
+        ),
+        (
+            header::CONTENT_DISPOSITION,
+            disposition(&plan, "inline", "-scenario.json"),
+        ),
+    ];
+    Ok((headers, document).into_response())
 }
 
 /// `GET /plans/{id}/result`.
@@ -102,12 +112,17 @@ async fn written(
         };
         state.terrains.over(caller, scenario, write).await??
     };
+    let kind = if format.shown { "inline" } else { "attachment" };
+    let ending = format!(".{}", format.extension);
     let headers = [
         (
             header::CONTENT_TYPE,
             HeaderValue::from_static(format.media_type),
         ),
-        (header::CONTENT_DISPOSITION, disposition(plan, format)),
+        (
+            header::CONTENT_DISPOSITION,
+            disposition(plan, kind, &ending),
+        ),
         (header::VARY, HeaderValue::from_static("accept")),
     ];
     Ok((headers, document).into_response())
@@ -136,13 +151,12 @@ fn write_first(
     Err(refusal.expect("there is at least one choice"))
 }
 
-/// How a browser should handle it.
-fn disposition(plan: &Plan, format: &Format) -> HeaderValue {
+/// How a browser should handle a document of `plan`: the `kind` of RFC 6266, and the file's name with this `ending`.
+fn disposition(plan: &Plan, kind: &str, ending: &str) -> HeaderValue {
     let (scenario, id) = (plan.name.as_deref(), plan.id.to_string());
-    let name = file_name(scenario, Some(&id), format);
-    let kind = if format.shown { "inline" } else { "attachment" };
+    let name = file_name(scenario, Some(&id), ending);
     // RFC 6266: a browser that knows the second name takes that.
-    let in_full = file_name_in_full(scenario, Some(&id), format).map_or_else(String::new, |name| {
+    let in_full = file_name_in_full(scenario, Some(&id), ending).map_or_else(String::new, |name| {
         let encoded = utf8_percent_encode(&name, ENCODED);
         format!("; filename*=UTF-8''{encoded}")
     });

@@ -200,7 +200,7 @@ pub fn routes() -> Vec<Route> {
             READ,
             terrains::elevations,
         ),
-        on(POST, "/scenarios:ground", PLAN, ground::sample),
+        on(POST, "/scenarios:ground", READ, ground::sample),
         on(GET, "/scenarios", Nothing, shipped::list),
         on(GET, "/scenarios/{name}", Nothing, shipped::show),
         on(GET, "/algorithms", Nothing, service::algorithms),

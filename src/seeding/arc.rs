@@ -184,14 +184,7 @@ pub(super) fn turn(from: Vector2<f64>, to: Vector2<f64>, sense: Sense) -> f64 {
 
 /// Distance of `point` to the segment from `a` to `b`.
 pub(super) fn point_segment(point: Point2, a: Point2, b: Point2) -> f64 {
-    let way = b - a;
-    let squared = way.norm_squared();
-    let share = if squared > 0.0 {
-        ((point - a).dot(&way) / squared).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    (point - (a + way * share)).norm()
+    ring::squared_distance((a, b), point).sqrt()
 }
 
 /// The nearest points of two segments, one on each.

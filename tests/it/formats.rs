@@ -135,6 +135,11 @@ async fn every_format_is_selected_by_name_and_by_media_type() {
         let by_type = api.get_with(&format!("{plan}/result"), &accept).await;
         assert_eq!(by_type.body, answer.body, "{}", format.name);
     }
+    let answer = api.get(&format!("{plan}/scenario")).await;
+    assert_eq!(
+        answer.header("content-disposition"),
+        format!("inline; filename=\"meadow-east-{tail}-scenario.json\"")
+    );
     let browser = "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8";
     let answer = api
         .get_with(&format!("{plan}/result"), &[("accept", browser)])

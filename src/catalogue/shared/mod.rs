@@ -116,15 +116,9 @@ impl Shared {
         };
         let record = view.names.get(name).ok_or_else(unknown)?;
         let shelved = view.contents.get(&record.sha256).ok_or_else(unknown)?;
-        Ok(Entry {
-            name: name.to_owned(),
-            sha256: Some(record.sha256.clone()),
-            bytes: shelved.content.bytes,
-            metadata: shelved.headers.metadata()?,
-            survey: Some(shelved.content.survey()),
-            uploaded_ms: Some(record.uploaded_ms),
-            owner: record.owner.clone(),
-        })
+        let (content, metadata) = (&shelved.content, shelved.headers.metadata()?);
+        let record = record.clone();
+        Ok(record.entry(name, content.bytes, metadata, content.survey()))
     }
 }
 

@@ -3,14 +3,11 @@
 use geotiff_core::geokeys::{self, GeoKeyDirectory};
 use tiff_reader::Ifd;
 
-use super::unsupported;
+use super::{OWN, unsupported};
 use crate::terrain::dem::{DemError, heights};
 
 /// A tag that no library defines.
 const GDAL_METADATA: u16 = 42112;
-
-/// The code of what a file describes in its own words.
-const OWN: u16 = 32767;
 
 /// Refuse elevations that are not metres above sea level.
 pub(super) fn check_heights(ifd: &Ifd, keys: &GeoKeyDirectory) -> Result<(), DemError> {

@@ -24,6 +24,9 @@ use place::{crs, keys, no_data, nodes};
 pub(super) use samples::Layout;
 use samples::layout;
 
+/// The geo key code of what a file describes in its own words.
+const OWN: u16 = 32767;
+
 /// Largest strip or tile that is decoded, bytes; while being decoded it is in memory three times.
 const LARGEST_BLOCK: usize = 8 << 20;
 

@@ -4,7 +4,7 @@ use geotiff_core::geokeys::{self, GeoKeyDirectory};
 use geotiff_core::tags;
 use tiff_reader::{Ifd, TagValue};
 
-use super::{malformed, unsupported};
+use super::{OWN, malformed, unsupported};
 use crate::terrain::dem::{Crs, DemError};
 
 /// The geo keys of an image; a missing directory counts as an empty one.
@@ -74,9 +74,6 @@ pub(super) fn nodes(ifd: &Ifd, keys: &GeoKeyDirectory) -> Result<([f64; 2], [f64
     }
     Ok((first, step))
 }
-
-/// The code of what a file describes in its own words.
-const OWN: u16 = 32767;
 
 /// The reference system stated by the keys.
 pub(super) fn crs(keys: &GeoKeyDirectory) -> Result<Option<Crs>, DemError> {

@@ -61,7 +61,10 @@ mod tests {
         ] {
             assert_eq!(file_name(name, id, ".kml"), expected);
         }
-        assert_eq!(file_name(Some(&"ab ".repeat(50)), None, ".kml").len(), 60 + 3);
+        assert_eq!(
+            file_name(Some(&"ab ".repeat(50)), None, ".kml").len(),
+            60 + 3
+        );
     }
 
     #[test]

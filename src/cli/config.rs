@@ -12,12 +12,10 @@ pub(super) fn of_environment(flags: &Flags) -> anyhow::Result<Loaded> {
         .map_err(|faults| anyhow!("wrong configuration\n  {}", faults.join("\n  ")))
 }
 
-/// Say which variables have no effect because of their spelling.
-pub(super) fn tell_misspelt() {
+/// A line about each variable that has no effect because of its spelling.
+pub(super) fn misspelt() -> Vec<String> {
     let names = std::env::vars_os().filter_map(|(name, _)| name.into_string().ok());
-    for line in config::misspelt(names) {
-        tracing::warn!("{line}");
-    }
+    config::misspelt(names)
 }
 
 /// The directory of the plans.

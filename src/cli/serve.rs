@@ -41,7 +41,11 @@ const LAST_ANSWERS: Duration = Duration::from_secs(5);
 pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
     let loaded = config::of_environment(flags)?;
     if flags.print_config {
-        let mut text = access::comment()?.unwrap_or_default().into_bytes();
+        let mut text = access::comment()?.unwrap_or_default();
+        for line in config::misspelt() {
+            text += &format!("# {line}\n");
+        }
+        let mut text = text.into_bytes();
         loaded.write_toml(&mut text)?;
         return files::print(&String::from_utf8_lossy(&text));
     }
@@ -52,7 +56,9 @@ pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
 pub(super) fn start(config: &Config) -> anyhow::Result<()> {
     let instruments = Arc::new(Instruments::default());
     let log = telemetry::log::init(config, &instruments.metrics)?;
-    config::tell_misspelt();
+    for line in config::misspelt() {
+        tracing::warn!("{line}");
+    }
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .build()?;

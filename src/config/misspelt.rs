@@ -22,6 +22,7 @@ pub fn misspelt(variables: impl IntoIterator<Item = String>) -> Vec<String> {
     let line = |name: String| {
         let hint = json::hint(&name, &known);
         let is_near = !known.contains(&name.as_str()) && !hint.is_empty();
+        let name = name.escape_debug();
         is_near.then(|| format!("the variable {name} is unknown and has no effect{hint}"))
     };
     ours.filter_map(line).collect()

@@ -151,6 +151,15 @@ fn a_negative_number_is_read_as_a_value() {
     assert!(text.contains("unexpected argument '-1'"), "{text}");
 }
 
+/// Whoever looks for why a setting has no effect looks here first.
+#[test]
+fn variables_that_are_nearly_settings_are_printed() {
+    let text = printed(&[("NOCTULE_WORKER", "3")], &[]);
+    let told = "# the variable NOCTULE_WORKER is unknown and has no effect, did you mean NOCTULE_WORKERS?\n";
+    assert!(text.starts_with(told), "{text}");
+    assert_eq!(values(&text), values(&printed(&[], &[])));
+}
+
 /// They are no setting, but whoever looks at the settings wants to know.
 #[test]
 fn keys_in_the_environment_are_printed_as_set_and_not_shown() {

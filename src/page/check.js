@@ -36,8 +36,10 @@ export function checkAsItChanges(draft, editor, stage) {
       } else if (refusal instanceof Unreachable) {
         hold(UNCHECKED, 'bad');
         setTimeout(() => signal.aborted || check(), AGAIN_MS);
-      } else if (refusal.status === 403) hold(MAY_NOT_PLAN, 'note');
-      else if (refusal instanceof Said && refusal.status !== 401) tell(refusal.message);
+      } else if (refusal.status === 403) {
+        hold(MAY_NOT_PLAN, 'note');
+        await sampleUnchecked(draft.document, stage, signal);
+      } else if (refusal instanceof Said && refusal.status !== 401) tell(refusal.message);
     }
   });
   draft.addEventListener('change', () => {
@@ -45,6 +47,15 @@ export function checkAsItChanges(draft, editor, stage) {
     checking?.abort();
     check();
   });
+}
+
+/** Whoever may only look sees the ground of what is there, too. */
+async function sampleUnchecked(document, stage, signal) {
+  try {
+    await stage.sample(document, signal);
+  } catch {
+    // What is wrong with a document is not told to whom it is not checked for.
+  }
 }
 
 /** The ground that ends lie under is drawn too, so that they can be placed on it. */

@@ -124,8 +124,8 @@ export class Stage {
   /** What the service knows of a dataset's ground, so that it can be drawn: under the area of a validated scenario, which the draft need not have. */
   async sample(scenario, signal) {
     const { terrain, area } = scenario;
-    if (terrain.kind !== 'dataset') return;
-    const key = JSON.stringify([terrain, area]);
+    if (terrain?.kind !== 'dataset') return;
+    const key = JSON.stringify([terrain, area ?? scenario]);
     if (this.#sampled?.key !== key) {
       const ground = await ask(`/scenarios:ground?columns=${SAMPLES}&rows=${SAMPLES}`, { method: 'POST', body: scenario, signal });
       this.#sampled = { key, name: terrain.name, ground };

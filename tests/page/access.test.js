@@ -178,6 +178,25 @@ test('elevations are uploaded only with a key that may', async (t) => {
   }
 });
 
+test('the ground of a dataset is drawn for a key that may only look', async (t) => {
+  const directory = mkdtempSync(join(tmpdir(), 'noctule-keys-'));
+  t.after(() => rmSync(directory, { recursive: true, force: true }));
+  const reader = spawnSync(process.env.NOCTULE_BIN, ['key', 'new', '--name', 'reader', '--scopes', 'read'], { encoding: 'utf8', cwd: directory });
+  writeFileSync(join(directory, 'keys.toml'), reader.stdout);
+  const terrain = fileURLToPath(new URL('../../scenarios/terrain', import.meta.url));
+  const guarded = await service('--keys-file', join(directory, 'keys.toml'), '--terrain-dir', terrain);
+  t.after(guarded.stop);
+  const page = await open(chrome, 'about:blank');
+  page.allowed = /status of 403/;
+  await page.goto(guarded.url);
+  await page.fill('#key-field', reader.stderr.trim().split('\n').at(-1));
+  await page.keyboard.press('Enter');
+  await drawn(page, FIRST);
+  await page.waitForFunction(() => globalThis.noctule.document().terrain.kind === 'dataset' && globalThis.noctule.scene().ground.columns === 201);
+  await page.waitForFunction(() => /may look at plans, but may not plan/.test(document.body.textContent));
+  await page.done();
+});
+
 test('without WebGL the form, the strip and the tables have everything', async () => {
   const page = await open(chrome, 'about:blank');
   page.allowed = /WebGL/;

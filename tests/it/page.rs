@@ -193,10 +193,11 @@ async fn ground_in_degrees_is_sampled_in_degrees() {
 }
 
 #[tokio::test]
-async fn sampling_ground_needs_a_key_that_may_plan() {
+async fn sampling_ground_needs_a_key_that_may_read() {
     let keys = [
         entry("alice", "of alice", "plan", ""),
         entry("rita", "of rita", "read", ""),
+        entry("max", "of max", "metrics", ""),
     ];
     let api = Api::with_keys(&keys.concat());
     let ask = async |more: &[(&str, &str)]| {
@@ -207,7 +208,8 @@ async fn sampling_ground_needs_a_key_that_may_plan() {
     };
     assert_eq!(ask(&[]).await.status, StatusCode::UNAUTHORIZED);
     for (secret, expected) in [
-        ("of rita", StatusCode::FORBIDDEN),
+        ("of max", StatusCode::FORBIDDEN),
+        ("of rita", StatusCode::OK),
         ("of alice", StatusCode::OK),
     ] {
         let answer = ask(&[("authorization", &bearer(secret))]).await;

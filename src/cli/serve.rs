@@ -41,11 +41,10 @@ const LAST_ANSWERS: Duration = Duration::from_secs(5);
 pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
     let loaded = config::of_environment(flags)?;
     if flags.print_config {
-        let mut text = access::comment()?.unwrap_or_default();
+        let mut text = access::comment()?.unwrap_or_default().into_bytes();
         for line in config::misspelt() {
-            text += &format!("# {line}\n");
+            writeln!(text, "# {line}")?;
         }
-        let mut text = text.into_bytes();
         loaded.write_toml(&mut text)?;
         return files::print(&String::from_utf8_lossy(&text));
     }

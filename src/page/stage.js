@@ -121,7 +121,7 @@ export class Stage {
     return Math.max(this.ground.at(x, y) + above, this.ground.around?.(x, y) ?? -Infinity);
   }
 
-  /** What the service knows of a dataset's ground, so that it can be drawn: under the area of a validated scenario, which the draft need not have. */
+  /** What the service knows of a dataset's ground, so that it can be drawn: under the area of a validated scenario, which the draft need not have; without one, where the service would plan. */
   async sample(scenario, signal) {
     const { terrain, area } = scenario;
     if (terrain?.kind !== 'dataset') return;

@@ -22,6 +22,18 @@ async function serious(page) {
     .map(({ id, nodes }) => `${id}: ${nodes.slice(0, 3).map(({ html, failureSummary }) => `${html} ${failureSummary}`).join(' | ')}`);
 }
 
+/** A service with a key of each of these scopes, until the test ends: `{url, keys}`. */
+async function guarded(t, scopes, ...settings) {
+  const directory = mkdtempSync(join(tmpdir(), 'noctule-keys-'));
+  t.after(() => rmSync(directory, { recursive: true, force: true }));
+  const news = scopes.map((scope) => spawnSync(process.env.NOCTULE_BIN, ['key', 'new', '--name', scope, '--scopes', scope], { encoding: 'utf8', cwd: directory }));
+  const file = join(directory, 'keys.toml');
+  writeFileSync(file, news.map(({ stdout }) => stdout).join('\n'));
+  const { url, stop } = await service('--keys-file', file, ...settings);
+  t.after(stop);
+  return { url, keys: news.map(({ stderr }) => stderr.trim().split('\n').at(-1)) };
+}
+
 for (const colorScheme of ['light', 'dark']) {
   test(`axe finds nothing serious, ${colorScheme}`, async () => {
     const page = await open(chrome, `${site.url}#plan=${await made(site.url, SMALL)}`, { colorScheme });
@@ -82,14 +94,8 @@ test('the keyboard alone leads from a scenario to a read result', async () => {
 });
 
 test('Enter uses the key, and after a no what needs one asks again', async (t) => {
-  const directory = mkdtempSync(join(tmpdir(), 'noctule-keys-'));
-  t.after(() => rmSync(directory, { recursive: true, force: true }));
-  const made_ = spawnSync(process.env.NOCTULE_BIN, ['key', 'new', '--name', 'planner', '--scopes', 'plan'], { encoding: 'utf8', cwd: directory });
-  writeFileSync(join(directory, 'keys.toml'), made_.stdout);
-  const key = made_.stderr.trim().split('\n').at(-1);
-  const guarded = await service('--keys-file', join(directory, 'keys.toml'));
-  t.after(guarded.stop);
-  const page = await open(chrome, guarded.url);
+  const { url, keys: [key] } = await guarded(t, ['plan']);
+  const page = await open(chrome, url);
   await page.waitForSelector('#key[open]');
   await page.keyboard.press('Escape');
   await drawn(page, FIRST);
@@ -114,16 +120,11 @@ test('Enter uses the key, and after a no what needs one asks again', async (t) =
 });
 
 test('a service with keys is asked with one, kept in memory, and followed with tickets', async (t) => {
-  const directory = mkdtempSync(join(tmpdir(), 'noctule-keys-'));
-  const made_ = spawnSync(process.env.NOCTULE_BIN, ['key', 'new', '--name', 'planner', '--scopes', 'plan'], { encoding: 'utf8', cwd: directory });
-  writeFileSync(join(directory, 'keys.toml'), made_.stdout);
-  const key = made_.stderr.trim().split('\n').at(-1);
-  const guarded = await service('--keys-file', join(directory, 'keys.toml'));
-  t.after(guarded.stop);
+  const { url, keys: [key] } = await guarded(t, ['plan']);
   const asked = [];
   const page = await open(chrome, 'about:blank');
   page.on('request', (request) => asked.push(request.url()));
-  await page.goto(guarded.url);
+  await page.goto(url);
   await page.waitForSelector('#key[open]');
   await page.fill('#key-field', 'noctule_wrong');
   await page.click('#key button.main');
@@ -137,29 +138,23 @@ test('a service with keys is asked with one, kept in memory, and followed with t
   await plan(page);
   await page.click('#tab-plans');
   await page.waitForSelector('.plans tbody tr');
-  assert.ok(asked.some((url) => url.includes('/events?') && url.includes('ticket=')), 'a ticket opened the stream');
-  assert.ok(!asked.some((url) => url.includes(key)), 'the key was in no address');
+  assert.ok(asked.some((address) => address.includes('/events?') && address.includes('ticket=')), 'a ticket opened the stream');
+  assert.ok(!asked.some((address) => address.includes(key)), 'the key was in no address');
   assert.deepEqual(await page.evaluate(() => [localStorage.length, sessionStorage.length, document.cookie]), [0, 0, '']);
   // The key is forgotten with the page, so it is requested again.
   await page.reload();
   await page.waitForSelector('#key[open]');
   await page.done();
-  rmSync(directory, { recursive: true, force: true });
 });
 
 test('elevations are uploaded only with a key that may', async (t) => {
-  const directory = mkdtempSync(join(tmpdir(), 'noctule-keys-'));
-  t.after(() => rmSync(directory, { recursive: true, force: true }));
-  const [reader, planner] = ['read', 'plan'].map((scope) => spawnSync(process.env.NOCTULE_BIN, ['key', 'new', '--name', scope, '--scopes', scope], { encoding: 'utf8', cwd: directory }));
-  writeFileSync(join(directory, 'keys.toml'), `${reader.stdout}\n${planner.stdout}`);
-  const guarded = await service('--keys-file', join(directory, 'keys.toml'));
-  t.after(guarded.stop);
+  const { url, keys: [reader, planner] } = await guarded(t, ['read', 'plan']);
   const file = fileURLToPath(new URL('../../scenarios/terrain/jacksboro.tif', import.meta.url));
   for (const key of [reader, planner]) {
     const page = await open(chrome, 'about:blank');
     page.allowed = /status of 403/;
-    await page.goto(guarded.url);
-    await page.fill('#key-field', key.stderr.trim().split('\n').at(-1));
+    await page.goto(url);
+    await page.fill('#key-field', key);
     await page.keyboard.press('Enter');
     await drawn(page, FIRST);
     await page.setInputFiles('#file', file);
@@ -179,17 +174,12 @@ test('elevations are uploaded only with a key that may', async (t) => {
 });
 
 test('the ground of a dataset is drawn for a key that may only look', async (t) => {
-  const directory = mkdtempSync(join(tmpdir(), 'noctule-keys-'));
-  t.after(() => rmSync(directory, { recursive: true, force: true }));
-  const reader = spawnSync(process.env.NOCTULE_BIN, ['key', 'new', '--name', 'reader', '--scopes', 'read'], { encoding: 'utf8', cwd: directory });
-  writeFileSync(join(directory, 'keys.toml'), reader.stdout);
   const terrain = fileURLToPath(new URL('../../scenarios/terrain', import.meta.url));
-  const guarded = await service('--keys-file', join(directory, 'keys.toml'), '--terrain-dir', terrain);
-  t.after(guarded.stop);
+  const { url, keys: [reader] } = await guarded(t, ['read'], '--terrain-dir', terrain);
   const page = await open(chrome, 'about:blank');
   page.allowed = /status of 403/;
-  await page.goto(guarded.url);
-  await page.fill('#key-field', reader.stderr.trim().split('\n').at(-1));
+  await page.goto(url);
+  await page.fill('#key-field', reader);
   await page.keyboard.press('Enter');
   await drawn(page, FIRST);
   await page.waitForFunction(() => globalThis.noctule.document().terrain.kind === 'dataset' && globalThis.noctule.scene().ground.columns === 201);

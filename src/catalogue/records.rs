@@ -1,4 +1,4 @@
-//! The stored records of names and contents, and the rules for changing a name.
+//! The stored records of names and contents, and the rules for following and changing a name.
 
 use std::collections::BTreeMap;
 
@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::content::{Checked, Declaration};
 use super::{CatalogueError, Entry, Expected, Kept, Naming, Room};
+use crate::terrain::DatasetError;
 use crate::terrain::dem::{Metadata, Survey};
 
 /// The stored record of a name.
@@ -51,6 +52,41 @@ impl Name {
             room.admit_name(names.len())?;
         }
         Ok(before)
+    }
+
+    /// The checksum of the requested content: `sha256` where it is given, otherwise that of the name's content.
+    pub(super) fn wanted<'a>(
+        names: &'a BTreeMap<String, Self>,
+        name: &str,
+        sha256: Option<&'a str>,
+    ) -> Result<&'a str, DatasetError> {
+        let named = || names.get(name).map(|name| &*name.sha256);
+        sha256.or_else(named).ok_or_else(|| Self::unknown(names))
+    }
+
+    /// Why there is no record of the content `wanted` under `name`. While it may be one of the records that cannot be
+    /// read (`may_be_unread`), nobody knows whether it has gone.
+    pub(super) fn missing(
+        names: &BTreeMap<String, Self>,
+        name: &str,
+        wanted: &str,
+        may_be_unread: bool,
+    ) -> DatasetError {
+        match names.get(name) {
+            Some(Self { sha256, .. }) if sha256 == wanted || may_be_unread => {
+                DatasetError::Unavailable(format!("nothing is known of the content {wanted}"))
+            }
+            Some(Self { sha256, .. }) => DatasetError::Replaced {
+                sha256: sha256.clone(),
+            },
+            None => Self::unknown(names),
+        }
+    }
+
+    fn unknown(names: &BTreeMap<String, Self>) -> DatasetError {
+        DatasetError::Unknown {
+            names: names.keys().cloned().collect(),
+        }
     }
 
     /// The result of assigning a name that refers to `before` to `file`, and its record then.

@@ -162,22 +162,11 @@ impl Uploads for Uploaded {
     fn find(&self, name: &str, sha256: Option<&str>) -> Result<Found, DatasetError> {
         let (sha256, declared) = {
             let mut state = self.state.lock();
-            let named = state.names.get(name).map(|name| name.sha256.clone());
-            let wanted = match (sha256, &named) {
-                (Some(sha256), _) => sha256.to_owned(),
-                (None, Some(named)) => named.clone(),
-                (None, None) => {
-                    let names = state.names.keys().cloned().collect();
-                    return Err(DatasetError::Unknown { names });
-                }
-            };
+            let wanted = Name::wanted(&state.names, name, sha256)?.to_owned();
             let Some(content) = state.contents.get(&wanted) else {
-                return Err(match named {
-                    Some(sha256) => DatasetError::Replaced { sha256 },
-                    None => DatasetError::Unknown {
-                        names: state.names.keys().cloned().collect(),
-                    },
-                });
+                // A content is removed before its record, so one that is there has a record that cannot be read.
+                let is_unread = self.content(&wanted).is_file();
+                return Err(Name::missing(&state.names, name, &wanted, is_unread));
             };
             let declared = content.declared.clone();
             state.asked.insert(wanted.clone(), Instant::now());
@@ -316,5 +305,65 @@ fn read<T: DeserializeOwned>(path: &Path) -> Option<T> {
             tracing::error!(file = %path.display(), %error, "a dataset's record cannot be read");
             None
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use super::*;
+    use crate::catalogue::{Claim, Declaration, Expected};
+
+    /// Level ground at one height, over one degree, in place of what the name `hill` referred to; its checksum.
+    fn keep(uploaded: &Uploaded, height: u32) -> String {
+        let head = "ncols 2\nnrows 2\nxllcenter 7\nyllcenter 47\ncellsize 1";
+        let mut staged = uploaded.stage(10_000).expect("there is room");
+        writeln!(staged, "{head}\n{height} {height}\n{height} {height}").expect("it is short");
+        let checked = staged
+            .check(None, Declaration::default())
+            .expect("it is right");
+        let naming = Naming {
+            name: "hill".to_owned(),
+            by: Claim {
+                owner: None,
+                over_all: true,
+            },
+            now_ms: 7,
+            expected: Expected::Anything,
+        };
+        let kept = uploaded.keep(&checked, &naming, Room::ENDLESS);
+        kept.expect("it is kept");
+        checked.sha256
+    }
+
+    /// The record may be damaged, or of a newer version: plans over its content wait until it can be read.
+    #[test]
+    fn a_content_whose_record_cannot_be_read_may_be_had_later() {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let open = || Uploaded::open(directory.path(), Duration::ZERO).expect("nobody else has it");
+        let uploaded = open();
+        let [old, new] = [100, 50].map(|height| keep(&uploaded, height));
+        drop(uploaded);
+        let unavailable = |found| matches!(found, Err(DatasetError::Unavailable(_)));
+
+        let record = |sha256: &str| directory.path().join(format!("content/{sha256}.json"));
+        for (damaged, other) in [(&new, &old), (&old, &new)] {
+            let record = record(damaged);
+            let text = fs::read_to_string(&record).expect("it is there");
+            fs::write(&record, "").expect("written");
+            let uploaded = open();
+            assert!(unavailable(uploaded.find("hill", Some(damaged))));
+            assert!(uploaded.find("hill", Some(other)).is_ok());
+            assert_eq!(unavailable(uploaded.find("hill", None)), *damaged == new);
+            drop(uploaded);
+            fs::write(&record, text).expect("written");
+            assert!(open().find("hill", Some(damaged)).is_ok());
+        }
+
+        let uploaded = open();
+        assert_eq!(uploaded.sweep(&BTreeSet::new()).expect("swept"), 1);
+        let gone = uploaded.find("hill", Some(&old));
+        assert!(matches!(gone, Err(DatasetError::Replaced { sha256 }) if sha256 == new));
     }
 }

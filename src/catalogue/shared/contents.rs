@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::Shared;
 use super::headers::Headers;
 use super::view::{Shelved, View, content_key};
-use crate::catalogue::records::Content;
+use crate::catalogue::records::{Content, Name};
 use crate::catalogue::{CatalogueError, Checked, Room, Staged};
 use crate::terrain::DatasetError;
 
@@ -89,26 +89,10 @@ impl Shared {
                 // Content with a given checksum never changes, so a copy is as good as the original.
                 Err(away) => return self.copied(sha256).ok_or_else(|| away.into()),
             };
-            let unknown = || DatasetError::Unknown {
-                names: view.names.keys().cloned().collect(),
-            };
-            let named = view.names.get(name).map(|name| &name.sha256);
-            let wanted = match (sha256, named) {
-                (Some(sha256), _) => sha256,
-                (None, Some(named)) => named,
-                (None, None) => return Err(unknown()),
-            };
+            let wanted = Name::wanted(&view.names, name, sha256)?;
             let Some(content) = view.contents.get(wanted) else {
-                return Err(match named {
-                    Some(named) if named == wanted || view.has_unread() => {
-                        let why = format!("nothing is known of the content {wanted}");
-                        DatasetError::Unavailable(why)
-                    }
-                    Some(named) => DatasetError::Replaced {
-                        sha256: named.clone(),
-                    },
-                    None => unknown(),
-                });
+                let may_be_unread = view.has_unread();
+                return Err(Name::missing(&view.names, name, wanted, may_be_unread));
             };
             if self.need(&view, wanted)? {
                 return Ok((wanted.to_owned(), content.clone()));

@@ -105,6 +105,16 @@ impl Draft {
         });
     }
 
+    /// Whether the start or the target is set; one that the flight gives is from the beginning.
+    pub(super) fn has(&self, end: &str) -> bool {
+        let slot = if end == "start" {
+            &self.start
+        } else {
+            &self.target
+        };
+        slot.is_some()
+    }
+
     /// Set the start or the target; the first one found counts. `alt` is `None` if it is not known.
     pub(super) fn end(&mut self, end: &str, at: &str, place: Place, alt: Option<f64>) {
         let slot = if end == "start" {

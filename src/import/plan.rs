@@ -88,7 +88,8 @@ pub(super) fn convert(
     draft.elevation = home.and_then(|home| home.alt.as_f64());
     draft.cruise_speed = speed(mission);
     let stops = stops(&mut draft, items, home);
-    if stops.is_empty() {
+    let has_ends = draft.has("start") && draft.has("target");
+    if stops.is_empty() && !has_ends {
         let detail = "the mission has no item with a position: its first and its last one make start and target";
         return Err(draft.refused(detail.to_owned()));
     }
@@ -260,14 +261,19 @@ fn sum(one: f64, other: f64) -> f64 {
     if rounded.is_finite() { rounded } else { sum }
 }
 
-/// The mission's first and last stop; a single stop is the target, reached from home.
+/// The mission's first and last stop; a single stop is the target, reached from home. Where the flight gives an end, that
+/// of the mission is only listed, whatever its altitude.
 ///
 /// # Errors
-/// When the altitude of one of them, or of the home that it counts from, is not known: without it, the next stop would be
-/// taken for the end.
+/// When the altitude of one that is needed, or of the home that it counts from, is not known: without it, the next stop
+/// would be taken for the end.
 fn ends(draft: &mut Draft, home: Option<Home>, stops: &[Stop]) -> Result<(), String> {
     let set = |draft: &mut Draft, end: &str, stop: &Stop| -> Result<(), String> {
         let at = stop.at();
+        if draft.has(end) {
+            draft.end(end, &at, stop.place, None);
+            return Ok(());
+        }
         let alt = stop.altitude(home);
         let alt = alt.map_err(|reason| format!("the {end}, {at}, {reason}"))?;
         let pointer = format!("/{end}/alt");
@@ -284,11 +290,14 @@ fn ends(draft: &mut Draft, home: Option<Home>, stops: &[Stop]) -> Result<(), Str
         ([], _) => {}
         ([only], Some(Home { place, alt })) => {
             let at = "/mission/plannedHomePosition";
-            let alt = alt.as_f64().ok_or_else(|| {
+            let known = alt.as_f64();
+            if known.is_none() && !draft.has("start") {
                 let alt = shown(alt);
-                format!("the start, {at}, has the altitude {alt}, must be a number")
-            })?;
-            draft.end("start", at, place, Some(alt));
+                return Err(format!(
+                    "the start, {at}, has the altitude {alt}, must be a number"
+                ));
+            }
+            draft.end("start", at, place, known);
             set(draft, "target", only)?;
         }
         ([only], None) => set(draft, "target", only)?,

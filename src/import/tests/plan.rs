@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::super::*;
-use super::{convert, unused};
+use super::{MOST, convert, unused};
 
 #[test]
 fn missions_and_fences_of_a_plan() {
@@ -370,4 +370,73 @@ fn a_mission_without_positions_is_refused_in_words_of_its_own() {
         refused.to_string(),
         "the mission has no item with a position: its first and its last one make start and target"
     );
+}
+
+#[test]
+fn an_end_that_the_request_gives_is_not_needed_in_a_plan() {
+    let item = |lat: f64, alt: Value| json!({"type": "SimpleItem", "command": 16, "frame": 0, "params": [0, 0, 0, null, lat, 8.5, alt]});
+    let converted = |items: &[Value], start: Option<&str>, target: Option<&str>| {
+        let end = |text: &str| text.parse::<End>().expect("an end");
+        let flight = Flight {
+            start: start.map(end),
+            target: target.map(end),
+            within_m: None,
+        };
+        let mission = json!({"plannedHomePosition": [47.2, 8.5, null], "items": items});
+        let plan = json!({"fileType": "Plan", "mission": mission}).to_string();
+        super::super::convert(plan.as_bytes(), Syntax::Json, MOST, &flight)
+    };
+    let (start, target) = (Some("47.1,8.2,500"), Some("47.6,8.3,520"));
+    let start_is = json!({"lat": 47.1, "lon": 8.2, "alt": 500.0});
+    let target_is = json!({"lat": 47.6, "lon": 8.3, "alt": 520.0});
+    let takeoff = json!({"type": "SimpleItem", "command": 22, "frame": 3, "params": [0, 0, 0, null, 47.3, 8.5, 30]});
+    let (unknown, known) = (item(47.4, json!(null)), item(47.5, json!(530)));
+
+    let home_is_left = "/mission/plannedHomePosition: another point is the start already";
+    let start_is_left = "/mission/items/0: another point is the start already";
+    let target_is_left =
+        |index: usize| format!("/mission/items/{index}: another point is the target already");
+    for (items, left) in [
+        (vec![], vec![]),
+        (
+            vec![unknown.clone()],
+            vec![home_is_left.to_owned(), target_is_left(0)],
+        ),
+        (
+            vec![takeoff, unknown.clone()],
+            vec![start_is_left.to_owned(), target_is_left(1)],
+        ),
+    ] {
+        let found = converted(&items, start, target).expect("a scenario");
+        assert_eq!(found.scenario["start"], start_is);
+        assert_eq!(found.scenario["target"], target_is);
+        assert_eq!(unused(&found), left);
+        let mut assumed = found.assumed.iter();
+        assert!(assumed.all(|assumed| !assumed.pointer.ends_with("/alt")));
+    }
+
+    let items = [unknown.clone(), known];
+    let found = converted(&items, start, None).expect("a scenario");
+    assert_eq!(found.scenario["start"], start_is);
+    assert_eq!(found.scenario["target"]["alt"], 530.0);
+    assert_eq!(unused(&found), [start_is_left]);
+
+    // The other end still is.
+    for (items, expected) in [
+        (
+            items.to_vec(),
+            "the start, /mission/items/0, has the altitude null, must be a number",
+        ),
+        (
+            vec![unknown],
+            "the start, /mission/plannedHomePosition, has the altitude null, must be a number",
+        ),
+        (
+            vec![],
+            "the mission has no item with a position: its first and its last one make start and target",
+        ),
+    ] {
+        let refused = converted(&items, None, target).expect_err(expected);
+        assert_eq!(refused.to_string(), expected);
+    }
 }

@@ -296,6 +296,7 @@ impl JetStream {
                             return Ok(Some(Change::announced(record)));
                         }
                         record.plan.requeue()?;
+                        record.plan.queue_position = Some(self.view.known().position(record.place));
                         events.push(record.status());
                     }
                     Status::Succeeded | Status::Failed | Status::Cancelled => return Ok(None),

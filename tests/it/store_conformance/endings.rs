@@ -297,6 +297,13 @@ async fn a_plan_that_loses_five_workers_fails() {
         let told = history(&**store, id).await;
         assert_eq!(told.last(), Some(&Event::End(Status::Failed)));
         assert_eq!(statuses(&told).last(), Some(&Status::Failed));
+        for event in &told {
+            if let Event::Status(plan) = event
+                && plan.status == Status::Queued
+            {
+                assert_eq!(plan.queue_position, Some(1));
+            }
+        }
         assert_eq!(store.incumbent(id).await.unwrap(), None);
         idle.abort();
         idle.await.ok();

@@ -284,7 +284,7 @@ impl Draft {
                 .map(|(name, _)| format!("no {name}"))
                 .collect();
             let detail = format!(
-                "{} in the file: a point of that name makes one, or the options start and target say where they are",
+                "{} in the file: a point of that name makes one in GeoJSON and KML, the options start and target do with any file",
                 missing.join(" and ")
             );
             return Err(self.refused(detail));

@@ -50,7 +50,7 @@ pub struct Assumed {
 /// A part of the file that was not used.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Unused {
-    /// JSON pointer into the file; for KML, the line and the name.
+    /// JSON pointer into the file; for KML and OpenAir, the line and the name.
     #[serde(rename = "where")]
     pub place: String,
     /// Why.
@@ -69,7 +69,7 @@ pub struct Most {
 /// Syntax of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Syntax {
-    /// GeoJSON, ED-269, or a QGroundControl plan.
+    /// GeoJSON, ED-269, ED-318, or a QGroundControl plan.
     Json,
     /// Lines of text: OpenAir.
     Lines,

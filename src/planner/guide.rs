@@ -30,8 +30,9 @@ pub(super) struct Guide<'s> {
 }
 
 impl<'s> Guide<'s> {
-    /// A guide from `seeds`, each brought to `waypoints` free waypoints.
-    pub(super) fn new(model: &Model<'s>, waypoints: usize, seeds: &[Vec<Point3>]) -> Self {
+    /// A guide from `seeds`, at least one, all with the same number of waypoints.
+    pub(super) fn new(model: &Model<'s>, seeds: &[Vec<Point3>]) -> Self {
+        let waypoints = seeds[0].len() - 2;
         let space = Cartesian::with_ends(model, waypoints);
         let spherical = Spherical::new(model.scenario, waypoints);
         let encode = |route: &Vec<Point3>| {

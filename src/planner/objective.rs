@@ -43,7 +43,7 @@ impl<'s> Routes<'s> {
     pub(super) fn guided(model: &Model<'s>, stop: &'s dyn Stop, seeds: &[Vec<Point3>]) -> Self {
         let waypoints = seeds[0].len() - 2;
         let coding = Coding::Cartesian(Cartesian::with_ends(model, waypoints));
-        let guide = Guide::new(model, waypoints, seeds);
+        let guide = Guide::new(model, seeds);
         Self::new(coding, Some(guide), model, stop)
     }
 

@@ -31,8 +31,9 @@ const CURVE_TOLERANCE: Tolerance = Tolerance {
 /// A chord of a curve may climb this much steeper than the limit, degrees.
 const CHORD_CLIMB_SLACK: f64 = 0.05;
 
-/// Maximum number of samples delivered; beyond it the spacing grows instead.
-const MOST_SAMPLES: f64 = 200_000.0;
+/// Maximum number of spacings in the length of a route; on a longer one the spacing grows. Where the path bends, there are
+/// more samples.
+const MOST_SPACINGS: f64 = 200_000.0;
 
 /// The smoothed path of `route`; `None` when even its polyline breaks a constraint.
 pub(super) fn smooth(model: &Model, route: &[Point3]) -> Option<Path> {
@@ -41,7 +42,7 @@ pub(super) fn smooth(model: &Model, route: &[Point3]) -> Option<Path> {
         .windows(2)
         .map(|ends| (ends[1] - ends[0]).norm())
         .sum();
-    let spacing = smoothing.spacing.max(length / MOST_SAMPLES);
+    let spacing = smoothing.spacing.max(length / MOST_SPACINGS);
     let mut tightness: Vec<Tightness> = vec![0; route.len()];
     loop {
         let (control_points, corners) = control_points(route, &tightness, smoothing.degree);

@@ -1,7 +1,7 @@
 //! What can be computed from a scenario's geometry before any search: the taut strings round its obstacles, and a cost
 //! that no feasible route can undercut.
 //!
-//! Deliberately absent: routes of waypoints, and everything that a vehicle can or cannot fly.
+//! Deliberately absent: routes of waypoints, and turns.
 
 mod arc;
 mod bound;

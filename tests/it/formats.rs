@@ -523,7 +523,7 @@ fn the_command_line_groups_what_it_does_not_use() {
     assert_eq!(
         String::from_utf8_lossy(&told.stderr),
         "not used /features/0, /features/1, /features/2 and 2 more: a line: points and polygons make a scenario\n\
-         -: no start and no target in the file: a point of that name makes one, or the options start and target say where they are\n"
+         -: no start and no target in the file: a point of that name makes one in GeoJSON and KML, the options start and target do with any file\n"
     );
 }
 

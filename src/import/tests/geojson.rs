@@ -243,11 +243,11 @@ fn a_file_without_ends_is_no_scenario() {
     };
     check(
         r#"{"type": "FeatureCollection", "features": []}"#,
-        "no start and no target in the file: a point of that name makes one, or the options start and target say where they are",
+        "no start and no target in the file: a point of that name makes one in GeoJSON and KML, the options start and target do with any file",
     );
     check(
         &point("start", json!([1, 2, 3])).to_string(),
-        "no target in the file: a point of that name makes one, or the options start and target say where they are",
+        "no target in the file: a point of that name makes one in GeoJSON and KML, the options start and target do with any file",
     );
     check(
         r#"{"type": "FeatureCollection"}"#,

@@ -385,7 +385,7 @@ fn a_map_without_ends_is_refused_and_told_how_to_give_them() {
     let refused = convert(file.as_bytes(), Syntax::of(file.as_bytes())).expect_err("no ends");
     assert_eq!(
         refused.to_string(),
-        "no start and no target in the file: a point of that name makes one, or the options start and target say where they are"
+        "no start and no target in the file: a point of that name makes one in GeoJSON and KML, the options start and target do with any file"
     );
 }
 

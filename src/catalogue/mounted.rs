@@ -3,7 +3,6 @@
 
 use std::collections::btree_map;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -11,7 +10,7 @@ use parking_lot::Mutex;
 
 use super::content::{Declaration, Identity};
 use super::stamp::Stamp;
-use super::{CatalogueError, Entry, Tally};
+use super::{CatalogueError, Entry, Tally, files};
 use crate::terrain::dem::{Dataset, DemError, Survey};
 use crate::terrain::{DatasetError, Datasets, Found, is_dataset_name};
 
@@ -108,11 +107,7 @@ impl Mounted {
 
     /// Files by name; the first of several with the same name.
     fn files(&self) -> Result<BTreeMap<String, PathBuf>, CatalogueError> {
-        let unreadable = |error| CatalogueError::unavailable("read", &self.directory, error);
-        let mut paths = Vec::new();
-        for entry in fs::read_dir(&self.directory).map_err(unreadable)? {
-            paths.push(entry.map_err(unreadable)?.path());
-        }
+        let mut paths = files::listed(&self.directory)?;
         paths.sort();
         let mut files = BTreeMap::new();
         for path in paths {

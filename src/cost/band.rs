@@ -69,15 +69,8 @@ impl TerminalZones {
                 None
             }
         });
-        let mut cuts = [0.0, 1.0, 0.0, 1.0, 0.0, 1.0];
-        for (zone_idx, (t0, t1)) in inside
-            .iter()
-            .enumerate()
-            .filter_map(|(idx, part)| part.map(|p| (idx, p)))
-        {
-            cuts[2 + 2 * zone_idx] = t0;
-            cuts[3 + 2 * zone_idx] = t1;
-        }
+        let [(s0, s1), (t0, t1)] = inside.map(|part| part.unwrap_or((0.0, 1.0)));
+        let mut cuts = [0.0, 1.0, s0, s1, t0, t1];
         cuts.sort_by(f64::total_cmp);
         for pair in cuts.windows(2).filter(|pair| pair[0] < pair[1]) {
             let middle = 0.5 * (pair[0] + pair[1]);

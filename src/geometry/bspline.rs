@@ -71,7 +71,7 @@ impl BSpline {
     /// An upper bound of `|C''|` over the piece that begins with control point `first`: the second derivative is a
     /// spline of degree p - 2, which stays within the hull of its control points.
     #[must_use]
-    pub fn curvature_bound(&self, first: usize) -> f64 {
+    pub fn second_derivative_bound(&self, first: usize) -> f64 {
         let p = self.degree;
         if p < 2 {
             return 0.0;
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn the_curvature_bound_holds() {
+    fn the_bound_of_the_second_derivative_holds() {
         let spline = BSpline::clamped_uniform(zigzag(8), 3);
         for (first, u0, u1) in spline.spans() {
             let step = (u1 - u0) * 1e-3;
@@ -182,7 +182,7 @@ mod tests {
                 - spline.at(first, middle).coords * 2.0
                 + spline.at(first, middle - step).coords)
                 / (step * step);
-            assert!(second.norm() <= spline.curvature_bound(first) * (1.0 + 1e-6));
+            assert!(second.norm() <= spline.second_derivative_bound(first) * (1.0 + 1e-6));
         }
     }
 }

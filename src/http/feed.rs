@@ -177,11 +177,9 @@ impl Feed {
     /// Continue after the events that the store has deleted. A new reader asked for none of them, and starts with the
     /// current record.
     async fn skip(&mut self, forgotten: u64) -> Option<News> {
-        if self.throttle.holds() {
-            let mut out = Vec::new();
-            self.throttle.flush(&mut out);
-            self.held_since = None;
-            return Some(News::Events(out));
+        let held = self.held();
+        if held.is_some() {
+            return held;
         }
         let from = self.after + 1;
         (self.after, self.caught_up) = (forgotten, false);
@@ -198,6 +196,17 @@ impl Feed {
             }])),
             Err(error) => self.broken(error),
         }
+    }
+
+    /// What the throttle holds back, which comes before whatever takes the place of later events.
+    fn held(&mut self) -> Option<News> {
+        if !self.throttle.holds() {
+            return None;
+        }
+        let mut out = Vec::new();
+        self.throttle.flush(&mut out);
+        self.held_since = None;
+        Some(News::Events(out))
     }
 
     /// If the plan still waits, its newest event says where it was in the queue when it got there. A new reader is shown
@@ -233,10 +242,9 @@ impl Feed {
     /// The plan has been removed, and its events with it: what was not read is missing. Where nothing says how the plan
     /// ended, a reader who is behind cannot be told.
     fn removed(&mut self, end: Option<LastEvent>) -> Option<News> {
-        if self.throttle.holds() {
-            let mut out = Vec::new();
-            self.throttle.flush(&mut out);
-            return Some(News::Events(out));
+        let held = self.held();
+        if held.is_some() {
+            return held;
         }
         let next = self.after + 1;
         let here = self.caught_up.then_some(LastEvent {

@@ -12,7 +12,7 @@ use super::polish::{Polish, Steps};
 use super::{StopReason, is_from_scratch, newton, why_stop};
 use crate::cost::Model;
 use crate::geometry::{LEVEL, Point3, Vector2};
-use crate::optimizer::Random;
+use crate::optimizer::{Random, share_of};
 
 /// The search ends after so many kicks that gained nothing, and after so many in all.
 const IN_VAIN: usize = 24;
@@ -92,8 +92,10 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
 fn kicked(model: &Model, route: &[Point3], [many, which, far, side]: [f64; 4]) -> Vec<Point3> {
     let scenario = model.scenario;
     let free = route.len() - 2;
-    let count = 1 + share_of(PART.min(free), many);
-    let first = 1 + share_of(free - count + 1, which);
+    let most = PART.min(free);
+    let count = 1 + share_of(most, many).min(most - 1);
+    let places = free - count + 1;
+    let first = 1 + share_of(places, which).min(places - 1);
     let far = scenario.direct() * LEAST * libm::pow(TIMES, far);
     let way = route[first + count].xy() - route[first - 1].xy();
     let across = Vector2::new(-way.y, way.x);
@@ -111,16 +113,6 @@ fn kicked(model: &Model, route: &[Point3], [many, which, far, side]: [f64; 4]) -
             .into();
     }
     route
-}
-
-/// A number below `count`, which is more than 0.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a share of a count"
-)]
-fn share_of(count: usize, share: f64) -> usize {
-    ((count as f64 * share) as usize).min(count - 1)
 }
 
 /// Polish `route` while it does not come back to the best one, and keep it if it is better.

@@ -352,11 +352,7 @@ impl Obstacles {
         }
         let near = Rect::around([a, b]).expect("two points").grown(self.touch);
         let slips = |ring: &&Ring| {
-            let apart = ring.extent.min.x > near.max.x
-                || ring.extent.max.x < near.min.x
-                || ring.extent.min.y > near.max.y
-                || ring.extent.max.y < near.min.y;
-            if apart {
+            if !ring.extent.meets(&near) {
                 return false;
             }
             let along = way / length;

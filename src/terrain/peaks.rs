@@ -104,7 +104,7 @@ impl Peaks {
 
     /// Height above ground at `t` of `leg`.
     fn height(&self, leg: &Segment, t: f64) -> f64 {
-        let point = leg.a + (leg.b - leg.a) * t;
+        let point = leg.at(t);
         point.z - self.elevation(point.xy())
     }
 

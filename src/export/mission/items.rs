@@ -9,7 +9,7 @@ use crate::geometry::{Point3, Segment};
 use crate::planner::keeps_limits;
 
 /// MAVLink commands (`MAV_CMD`).
-const NAV_WAYPOINT: u16 = 16;
+pub(super) const NAV_WAYPOINT: u16 = 16;
 const NAV_LAND: u16 = 21;
 const NAV_TAKEOFF: u16 = 22;
 const DO_CHANGE_SPEED: u16 = 178;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::items::{FRAME_GLOBAL, Item, mission};
+use super::items::{FRAME_GLOBAL, Item, NAV_WAYPOINT, mission};
 use crate::export::{Altitude, Delivery, ExportError, Firmware, OptionFault, Options};
 
 /// Whether the firmware knows the frame of the altitudes.
@@ -24,7 +24,7 @@ pub(in crate::export) fn write(
 ) -> Result<String, ExportError> {
     let mission = mission(delivery, options)?;
     let home = Item {
-        command: 16,
+        command: NAV_WAYPOINT,
         frame: FRAME_GLOBAL,
         params: [Some(0.0); 4],
         place: Some(mission.home),

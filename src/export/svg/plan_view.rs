@@ -16,7 +16,7 @@ use crate::threat::{Shape, Threat};
 const CASING: &str =
     "fill=\"none\" stroke=\"#fff\" stroke-opacity=\"0.75\" stroke-linejoin=\"round\"";
 /// Style of every line of the route.
-const LINE: &str = "fill=\"none\" stroke-linejoin=\"round\" stroke-linecap=\"round\"";
+pub(super) const LINE: &str = "fill=\"none\" stroke-linejoin=\"round\" stroke-linecap=\"round\"";
 
 pub(super) fn draw(canvas: &mut Canvas, delivery: &Delivery, relief: &Relief, map: &MapScale) {
     let frame = &map.frame;

@@ -2,7 +2,7 @@
 
 use super::canvas::{Area, Canvas, Font, Spot, num, polyline, ring};
 use super::palette::{INK, MUTED, SOIL};
-use super::plan_view::{BROKEN_LEG, grid_line, start, target, thinned, waypoint};
+use super::plan_view::{BROKEN_LEG, LINE, grid_line, start, target, thinned, waypoint};
 use super::scale::Steps;
 use super::{broken, route_color};
 use crate::export::Delivery;
@@ -248,10 +248,9 @@ fn flown(
     scale: &Scale,
 ) {
     let color = route_color(delivery);
-    let line = "fill=\"none\" stroke-linejoin=\"round\" stroke-linecap=\"round\"";
     canvas.path(
         &polyline(&thinned(course)),
-        &format!("{line} stroke=\"{color}\" stroke-width=\"2.5\""),
+        &format!("{LINE} stroke=\"{color}\" stroke-width=\"2.5\""),
     );
     let marks: Vec<Spot> = if delivery.path.is_some() {
         let ways = abreast(&delivery.waypoints, stations);

@@ -179,26 +179,31 @@ fn hand_in(
 
 /// The problem for a plan that the store did not accept.
 async fn refusal(state: &AppState, error: StoreError) -> Problem {
-    let room = async || -> Result<u64, StoreError> {
-        Ok(retry::for_room(&state.store.stats().await?, state.capacity))
-    };
     match error {
-        StoreError::QueueFull { queued } => match room().await {
-            Ok(retry_after_s) => Problem::QueueFull {
+        StoreError::QueueFull { queued } => {
+            let full = |retry_after_s| Problem::QueueFull {
                 queued,
                 retry_after_s,
-            },
-            Err(error) => error.into(),
-        },
-        StoreError::QuotaReached { active, quota } => match room().await {
-            Ok(retry_after_s) => Problem::QuotaReached {
+            };
+            until_room(state, full).await
+        }
+        StoreError::QuotaReached { active, quota } => {
+            let full = |retry_after_s| Problem::QuotaReached {
                 active,
                 quota,
                 retry_after_s,
-            },
-            Err(error) => error.into(),
-        },
+            };
+            until_room(state, full).await
+        }
         error => error.into(),
+    }
+}
+
+/// The problem `full` with the seconds after which there may be room.
+async fn until_room(state: &AppState, full: impl FnOnce(u64) -> Problem) -> Problem {
+    match state.store.stats().await {
+        Ok(stats) => full(retry::for_room(&stats, state.capacity)),
+        Err(error) => error.into(),
     }
 }
 

@@ -57,7 +57,7 @@ impl<'s> Spherical<'s> {
             toward: [libm::cos(course), libm::sin(course)],
             distance,
             start_height: scenario.start.z - scenario.terrain.elevation(scenario.start.xy()),
-            steepest: libm::tan(max_climb),
+            steepest: scenario.vehicle.steepest(),
             bounds: Bounds {
                 lower: lower.repeat(legs),
                 upper: upper.repeat(legs),

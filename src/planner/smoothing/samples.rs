@@ -111,7 +111,7 @@ pub(super) fn fine_polyline(spline: &BSpline, samples: &[Sample]) -> (Vec<Point3
     for ends in samples.windows(2) {
         let (from, to) = (ends[0].u, ends[1].u);
         // A curve keeps within |C''| width^2 / 8 of its chord.
-        let bulge = spline.curvature_bound(ends[1].piece) * (to - from) * (to - from) / 8.0;
+        let bulge = spline.second_derivative_bound(ends[1].piece) * (to - from) * (to - from) / 8.0;
         let steps = (bulge / DEVIATION).sqrt().ceil().max(1.0);
         let mut step = 1.0;
         while step < steps {

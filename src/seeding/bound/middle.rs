@@ -19,7 +19,7 @@ pub(super) struct Middle {
 
 impl Middle {
     pub(super) fn of(scenario: &Scenario) -> Self {
-        let is_level = matches!(scenario.terrain, Terrain::Flat(_));
+        let is_level = scenario.terrain.is_flat();
         let [low, _] = elevations(&scenario.terrain);
         // Sums of peaks are rounded.
         let hair = if is_level {

@@ -18,13 +18,7 @@ const HAIR: f64 = 1e-3;
 
 /// Points along the edge of `rect`, all the way round, the first not repeated.
 fn edge(rect: Rect) -> impl Iterator<Item = Point2> {
-    let Rect { min, max } = rect;
-    let corners = [
-        min,
-        Point2::new(max.x, min.y),
-        max,
-        Point2::new(min.x, max.y),
-    ];
+    let corners = rect.corners();
     (0..4 * LOOKS).map(move |look| {
         let (a, b) = (corners[look / LOOKS], corners[(look / LOOKS + 1) % 4]);
         a + (b - a) * ((look % LOOKS) as f64 / LOOKS as f64)

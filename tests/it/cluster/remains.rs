@@ -6,24 +6,16 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use async_nats::jetstream::Context;
 use async_nats::jetstream::consumer::PullConsumer;
 use futures_util::StreamExt as _;
-use noctule::config::Address;
 use noctule::job::{Event, Idempotency, Plan, PlanId, Status, Submission};
 use noctule::store::jetstream::{JetStreamStore, Settings};
 use noctule::store::{Options, Retention, Store, StoreError};
 
-use crate::support::nats;
+use crate::support::nats::{self, client};
 use crate::support::patience::{eventually, in_time};
 use crate::support::plans::{failure, history, kind, point, submission};
 use crate::support::stores::node;
-
-/// A client that is not a node.
-async fn client(address: &str) -> Context {
-    let servers = Address::read(address).unwrap().servers;
-    async_nats::jetstream::new(async_nats::connect(servers).await.unwrap())
-}
 
 #[tokio::test(flavor = "multi_thread")]
 async fn deleting_a_plan_removes_results_that_no_record_names() {

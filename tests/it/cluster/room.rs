@@ -2,14 +2,13 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
-use async_nats::jetstream::{Context, stream};
+use async_nats::jetstream::stream;
 use futures_util::StreamExt as _;
-use noctule::config::Address;
 use noctule::job::{PlanId, Status, Submission};
 use noctule::store::jetstream::JetStreamStore;
 use noctule::store::{Options, Retention, Store, StoreError, Trouble, wall_clock};
 
-use crate::support::nats::{NatsServer, namespace};
+use crate::support::nats::{NatsServer, client, namespace};
 use crate::support::patience::in_time;
 use crate::support::plans::{ending, kind, point, submission};
 use crate::support::stores::node;
@@ -18,11 +17,6 @@ const ROOM: usize = 8 << 20;
 
 /// Longer than a message, so that it becomes an object.
 const LARGE: usize = 600_000;
-
-async fn client(address: &str) -> Context {
-    let servers = Address::read(address).unwrap().servers;
-    async_nats::jetstream::new(async_nats::connect(servers).await.unwrap())
-}
 
 /// Stores messages of somebody else's until no message is taken, however short.
 async fn fill(address: &str) {

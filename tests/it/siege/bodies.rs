@@ -1,9 +1,5 @@
 //! Bodies that are longer than allowed, or whose length is wrong.
 
-use std::io::Write as _;
-
-use flate2::Compression;
-use flate2::write::GzEncoder;
 use futures_util::StreamExt as _;
 use futures_util::stream::FuturesUnordered;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
@@ -11,6 +7,7 @@ use tokio::net::TcpStream;
 
 use super::Dice;
 use crate::support::api::Api;
+use crate::support::gzip::packed;
 use crate::support::patience::{eventually, in_time};
 use crate::support::process::Service;
 use crate::support::server::Server;
@@ -66,12 +63,6 @@ fn chunked(body: &[u8]) -> Vec<u8> {
     }
     chunks.extend(b"0\r\n\r\n");
     chunks
-}
-
-fn packed(plain: &[u8]) -> Vec<u8> {
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-    encoder.write_all(plain).expect("to memory");
-    encoder.finish().expect("to memory")
 }
 
 #[tokio::test]

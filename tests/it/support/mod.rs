@@ -6,6 +6,7 @@ pub(crate) mod description;
 pub(crate) mod elevations;
 pub(crate) mod engines;
 pub(crate) mod faulty_store;
+pub(crate) mod gzip;
 pub(crate) mod keys;
 pub(crate) mod lives;
 pub(crate) mod nats;

@@ -12,6 +12,8 @@ use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::{Duration, Instant};
 
+use async_nats::jetstream::Context;
+use noctule::config::Address;
 use tempfile::TempDir;
 use tokio::sync::{Mutex, MutexGuard};
 use uuid::Uuid;
@@ -341,4 +343,11 @@ fn well(monitor: u16, path: &str) -> bool {
 pub(crate) fn namespace(address: &str) -> &str {
     let (_, namespace) = address.rsplit_once('/').expect("it has one");
     namespace
+}
+
+/// A client that is not a node.
+pub(crate) async fn client(address: &str) -> Context {
+    let servers = Address::read(address).expect("an address").servers;
+    let connected = async_nats::connect(servers).await.expect("connected");
+    async_nats::jetstream::new(connected)
 }

@@ -1,6 +1,5 @@
 //! Unusable files, and bodies that are too long or break off: each gets a problem and leaves nothing behind.
 
-use std::io::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -23,6 +22,7 @@ use tokio::net::TcpStream;
 use super::{hill, jacksboro, kept, over, put, put_with};
 use crate::support::api::Api;
 use crate::support::elevations::{ascii_grid, write_tiff};
+use crate::support::gzip::packed;
 use crate::support::patience::{PATIENCE, eventually, in_time};
 use crate::support::process::Service;
 use crate::support::server::Server;
@@ -42,12 +42,6 @@ fn limited(mut api: Api, set: impl FnOnce(&mut Limits)) -> Api {
     api.state.rules = Arc::new(rules);
     api.router = http::router(api.state.clone());
     api
-}
-
-fn packed(plain: &[u8]) -> Vec<u8> {
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-    encoder.write_all(plain).expect("to memory");
-    encoder.finish().expect("to memory")
 }
 
 fn tiff(size: [u32; 2]) -> Vec<u8> {

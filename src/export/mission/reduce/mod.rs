@@ -225,17 +225,14 @@ impl Reduction<'_> {
         let before = if from == 0 {
             None
         } else {
-            let turnable = |leg: &&(usize, &Leg)| {
+            let turnable = |leg: &(usize, &Leg)| {
                 let start = leg.1.before.map_or(0, |(corner, _)| corner);
                 self.turns_into(choice[start].point, a.point, b.point)
             };
             let legs = arriving[from].iter().enumerate();
             let best = legs
-                .collect::<Vec<_>>()
-                .iter()
                 .filter(turnable)
-                .min_by(|one, other| better(one.1, other.1))
-                .copied();
+                .min_by(|one, other| better(one.1, other.1));
             Some(best?)
         };
         self.is_free(a, b).then(|| Leg {

@@ -2,8 +2,8 @@
 
 use super::log::Log;
 use super::search::guided;
-use super::starts::Starts;
-use super::{Nobody, Stop, StopReason};
+use super::starts::{self, Starts};
+use super::{Nobody, StopReason};
 use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
@@ -13,9 +13,6 @@ const POPULATION: usize = 200;
 
 /// Largest number of iterations of such a search.
 const ITERATIONS: usize = 200;
-
-/// Where a search starts.
-pub(super) type StartsOf = fn(&Model, &dyn Stop) -> Option<Starts>;
 
 /// The guided search of another `model` from `starts`, on behalf of the run of `log`, which counts what it prices: why it
 /// ended, and its best route. `None` where there is nothing to start from.
@@ -38,7 +35,6 @@ pub(super) fn aside(
 pub(super) fn aside_with(
     model: &Model,
     waypoints: usize,
-    starts: StartsOf,
     log: &mut Log,
 ) -> Option<(StopReason, Fitness, Vec<Point3>)> {
     let mut scenario = model.scenario.clone();
@@ -47,5 +43,5 @@ pub(super) fn aside_with(
     settings.population = settings.population.min(POPULATION);
     settings.iterations = settings.iterations.min(ITERATIONS);
     let other = Model::new(&scenario);
-    aside(&other, starts(&other, log.stop), None, log)
+    aside(&other, starts::routes(&other, log.stop), None, log)
 }

@@ -29,6 +29,7 @@ mod rules;
 mod search;
 mod share_out;
 mod simpler;
+mod slow_climbs;
 mod smoothing;
 mod starts;
 #[cfg(test)]
@@ -160,6 +161,9 @@ fn search_on(model: &Model, lower: f64, log: &mut Log) -> StopReason {
     }
     if goes_on(reason) && recount::is_worthwhile(model, lower, log) {
         reason = recount::search(model, log);
+    }
+    if goes_on(reason) && slow_climbs::is_worthwhile(model, lower, log) {
+        reason = slow_climbs::search(model, log);
     }
     if goes_on(reason) && roomier::is_worthwhile(model, log) {
         reason = roomier::search(model, log);

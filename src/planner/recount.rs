@@ -54,7 +54,7 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     log.tell();
     let waypoints = model.scenario.planner.waypoints;
     for other in numbers(model.scenario) {
-        let found = aside_with(model, other, starts::routes, log);
+        let found = aside_with(model, other, log);
         let Some((reason, best, route)) = found else {
             continue;
         };

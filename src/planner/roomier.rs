@@ -1,8 +1,7 @@
 //! The fallback where no route is found that keeps every limit: search for one with more waypoints, which is easier,
-//! then remove waypoints until the requested number is left. Where not even such a search finds one, ways along ledges
-//! join its starts.
+//! then remove waypoints until the requested number is left.
 
-use super::aside::{StartsOf, aside_with};
+use super::aside::aside_with;
 use super::fewer::leave_out;
 use super::finish::{Leads, finish};
 use super::log::Log;
@@ -10,12 +9,8 @@ use super::{StopReason, starts, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
 
-/// Where each attempt starts, and how many times the requested number of waypoints it uses.
-const ATTEMPTS: [(StartsOf, f64); 3] = [
-    (starts::routes, 1.4),
-    (starts::routes, 2.0),
-    (starts::along_ledges, 1.4),
-];
+/// How many times the requested number of waypoints each attempt uses.
+const ATTEMPTS: [f64; 2] = [1.4, 2.0];
 
 /// An attempt uses at least this many waypoints more than requested.
 const MORE: usize = 3;
@@ -23,9 +18,6 @@ const MORE: usize = 3;
 /// Where more waypoints than this are requested nothing is tried: they hardly ever lack waypoints, and removing some
 /// would take long.
 const MOST: usize = 64;
-
-/// Where this many routes with more waypoints could not do with fewer, the request has too few.
-const MOST_FAILED: usize = 2;
 
 /// Whether a search from routes, which ended with the best one of `log`, may still find one that keeps every limit.
 pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
@@ -40,12 +32,11 @@ pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
 pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     // It takes long, and the best so far may be all there is.
     log.tell();
-    let mut failed = 0;
-    for (starts, times) in ATTEMPTS {
+    for times in ATTEMPTS {
         if let Some(reason) = why_stop(model.scenario, log.stop) {
             return reason;
         }
-        let Some(route) = roomy(model, starts, times, log) else {
+        let Some(route) = roomy(model, times, log) else {
             continue;
         };
         match leave_out(model, route, log) {
@@ -55,18 +46,14 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
         if log.best.is_feasible() {
             return finish(model, StopReason::Iterations, &Leads::default(), log);
         }
-        failed += 1;
-        if failed == MOST_FAILED {
-            break;
-        }
     }
     StopReason::Iterations
 }
 
 /// A route with more waypoints that keeps every limit, if one is found.
-fn roomy(model: &Model, starts: StartsOf, times: f64, log: &mut Log) -> Option<Vec<Point3>> {
+fn roomy(model: &Model, times: f64, log: &mut Log) -> Option<Vec<Point3>> {
     let waypoints = more(model.scenario.planner.waypoints, times);
-    let (_, best, route) = aside_with(model, waypoints, starts, log)?;
+    let (_, best, route) = aside_with(model, waypoints, log)?;
     best.is_feasible().then_some(route)
 }
 
@@ -114,7 +101,7 @@ mod tests {
         let model = Model::new(&scenario);
         let (mut nobody, looks) = (Nobody, Looks::until(u32::MAX));
         let mut log = Log::new(&model, &mut nobody, &looks);
-        roomy(&model, starts::routes, ATTEMPTS[0].1, &mut log).expect("more waypoints are enough");
+        roomy(&model, ATTEMPTS[0], &mut log).expect("more waypoints are enough");
         let (before, priced) = (looks.count.get(), log.evaluations);
         // One look before the search with more waypoints, and one after it.
         for rounds in [0, 1] {

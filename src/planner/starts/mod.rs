@@ -37,6 +37,7 @@ pub(super) use count::with_waypoints;
 pub(super) use heap::spread;
 pub(super) use height::steepest;
 pub(super) use known::given;
+pub(super) use ledges::{ledges, thinned_out};
 pub(super) use round::at_heights_of;
 pub(super) use sides::different_first;
 pub(super) use vast::is_vast;
@@ -92,25 +93,15 @@ pub(super) fn are_wanted(scenario: &Scenario) -> bool {
 /// Where the search of `model` starts; `None` for the algorithm alone.
 pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     are_wanted(model.scenario)
-        .then(|| starts_from(Shapes::find, model, stop))
+        .then(|| starts_from(model, stop))
         .flatten()
 }
 
-/// As [`routes`], where a search from those has found no route that keeps every limit: along ledges too; `None` where
-/// there are none.
-pub(super) fn along_ledges(model: &Model, stop: &dyn Stop) -> Option<Starts> {
-    starts_from(Shapes::find_with_ledges, model, stop)
-}
-
-/// What `find` returns, brought to one number of waypoints, from the cheapest on; then refined, and seen in a wider band.
-fn starts_from(
-    find: impl Fn(&Model, &dyn Fn() -> bool) -> Shapes,
-    model: &Model,
-    stop: &dyn Stop,
-) -> Option<Starts> {
+/// All shapes, brought to one number of waypoints, from the cheapest on; then refined, and seen in a wider band.
+fn starts_from(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let settings = &model.scenario.planner;
     let is_over = || why_stop(model.scenario, stop).is_some();
-    let shapes = find(model, &is_over);
+    let shapes = Shapes::find(model, &is_over);
     if shapes.routes.is_empty() {
         return None;
     }

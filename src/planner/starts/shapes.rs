@@ -4,8 +4,7 @@
 use super::height::{is_steep, lifted};
 use super::net::Found;
 use super::{
-    climbs, contours, exposed, flanks, known, ledges, over, roadmap, rounded, tangents, trails,
-    ways, worth,
+    climbs, contours, exposed, flanks, known, over, roadmap, rounded, tangents, trails, ways, worth,
 };
 use crate::cost::Model;
 use crate::geometry::{Point2, Point3};
@@ -86,17 +85,6 @@ impl Shapes {
                 shapes.look_over_ground(model, is_over);
             }
         }
-        shapes
-    }
-
-    /// As [`Shapes::find`], with those along ledges; nothing where there are none.
-    pub(super) fn find_with_ledges(model: &Model, is_over: &dyn Fn() -> bool) -> Self {
-        let ledges = ledges::routes(model, is_over);
-        if ledges.routes.is_empty() {
-            return Self::default();
-        }
-        let mut shapes = Self::find(model, is_over);
-        shapes.add(ledges);
         shapes
     }
 

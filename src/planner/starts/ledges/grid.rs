@@ -1,9 +1,10 @@
-//! The shortest way over the grid: by A*, over the ranges of heights at which its cells can be reached.
+//! The cheapest way over the grid: by A*, over the ranges of heights at which its cells can be reached.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::ground::{Ground, Range, cells, common, holds, is_empty, wider};
+use super::tolls::Tolls;
 use crate::geometry::{Point2, Point3};
 
 /// Ranges of heights kept for one cell.
@@ -15,42 +16,57 @@ const REACH: f64 = 3.0;
 /// Cells looked at between two checks whether to stop.
 const UNWATCHED: usize = 1_000;
 
-/// Steps to the cells around: to neighbours, and a knight's move away.
-const STEPS: [[isize; 2]; 16] = [
+/// Steps to the cells around: to neighbours, and a knight's move away. The first half lead to cells of higher numbers, the
+/// others back.
+const STEPS: [[isize; 2]; 2 * ONWARD] = [
     [1, 0],
     [0, 1],
-    [-1, 0],
-    [0, -1],
     [1, 1],
     [-1, 1],
-    [-1, -1],
-    [1, -1],
     [2, 1],
     [1, 2],
     [-1, 2],
     [-2, 1],
+    [-1, 0],
+    [0, -1],
+    [-1, -1],
+    [1, -1],
     [-2, -1],
     [-1, -2],
     [1, -2],
     [2, -1],
 ];
 
+/// How many of the steps lead to cells of higher numbers.
+pub(super) const ONWARD: usize = 8;
+
+/// A step from one cell to the next.
+pub(super) struct Step {
+    /// The cell that it leads to.
+    pub(super) to: [usize; 2],
+    /// In half steps of the grid.
+    halfway: [usize; 2],
+    /// Metres.
+    away: f64,
+}
+
 /// The heights at which a way from the start can be over a cell.
 #[derive(Clone, Copy)]
 struct Reached {
     cell: [usize; 2],
     heights: Range,
-    length: f64,
+    cost: f64,
     before: Option<usize>,
 }
 
-/// What is still to be looked at, by the least length of a way over it and its number among all that was reached.
-/// Lengths are never negative, so their bits sort like them.
+/// What is still to be looked at, by the least cost of a way over it and its number among all that was reached.
+/// Costs are never negative, so their bits sort like them.
 type Open = BinaryHeap<Reverse<(u64, usize)>>;
 
 /// A grid between two ends.
 pub(super) struct Grid<'g> {
     pub(super) ground: &'g Ground,
+    pub(super) tolls: &'g Tolls,
     pub(super) ends: [Point3; 2],
     /// Metres climbed per metre at most.
     pub(super) climb: f64,
@@ -59,11 +75,11 @@ pub(super) struct Grid<'g> {
 }
 
 impl Grid<'_> {
-    /// The shortest way, if there is one.
-    pub(super) fn shortest(&self, is_over: &dyn Fn() -> bool) -> Option<Vec<Point3>> {
+    /// The cheapest way, if there is one that costs no more than `most`.
+    pub(super) fn cheapest(&self, most: f64, is_over: &dyn Fn() -> bool) -> Option<Vec<Point3>> {
         let mut search = Search::from_start(self);
         let mut looked_at = 0;
-        while let Some(own) = search.next() {
+        while let Some(own) = search.next(most) {
             looked_at += 1;
             if looked_at % UNWATCHED == 0 && is_over() {
                 return None;
@@ -140,19 +156,21 @@ impl Grid<'_> {
         }
         near
     }
+}
 
-    /// The cell one `step` from `cell`, where halfway to it is, and how far away it is.
-    fn next(&self, cell: [usize; 2], step: [isize; 2]) -> Option<([usize; 2], [usize; 2], f64)> {
-        let [columns, rows] = self.ground.size;
-        let column = cell[0]
-            .checked_add_signed(step[0])
-            .filter(|&column| column < columns)?;
-        let row = cell[1]
-            .checked_add_signed(step[1])
-            .filter(|&row| row < rows)?;
-        let away = self.ground.step * ((step[0] * step[0] + step[1] * step[1]) as f64).sqrt();
-        Some(([column, row], [cell[0] + column, cell[1] + row], away))
-    }
+/// The step number `direction` from `cell`, where it does not lead off the `ground`.
+pub(super) fn step(ground: &Ground, cell: [usize; 2], direction: usize) -> Option<Step> {
+    let step = STEPS[direction];
+    let next = |axis: usize| {
+        let next = cell[axis].checked_add_signed(step[axis]);
+        next.filter(|&next| next < ground.size[axis])
+    };
+    let to = [next(0)?, next(1)?];
+    Some(Step {
+        to,
+        halfway: [cell[0] + to[0], cell[1] + to[1]],
+        away: ground.step * ((step[0] * step[0] + step[1] * step[1]) as f64).sqrt(),
+    })
 }
 
 /// What has been reached so far.
@@ -183,7 +201,7 @@ impl<'g> Search<'g> {
             search.reach(Reached {
                 cell,
                 heights: common(from_start, grid.allowed(cell)),
-                length,
+                cost: length * grid.tolls.metre,
                 before: None,
             });
         }
@@ -197,14 +215,18 @@ impl<'g> Search<'g> {
             return;
         }
         let away = (self.grid.ends[1].xy() - self.grid.place(cell)).norm();
-        let least = reached.length + away;
+        let least = reached.cost + away * self.grid.tolls.metre;
         self.open.push(Reverse((least.to_bits(), self.all.len())));
         self.all.push(reached);
     }
 
-    /// The number of what is to be looked at now, which is known from then on.
-    fn next(&mut self) -> Option<usize> {
-        while let Some(Reverse((_, own))) = self.open.pop() {
+    /// The number of what is to be looked at now, which is known from then on; nothing if ways over it cost more than
+    /// `most`.
+    fn next(&mut self, most: f64) -> Option<usize> {
+        while let Some(Reverse((least, own))) = self.open.pop() {
+            if f64::from_bits(least) > most {
+                return None;
+            }
             let Reached { cell, heights, .. } = self.all[own];
             let number = self.number(cell);
             let known = &mut self.known[number];
@@ -232,20 +254,25 @@ impl<'g> Search<'g> {
     fn go_on(&mut self, own: usize) {
         let grid = self.grid;
         let from = self.all[own];
-        for step in STEPS {
-            let Some((next, halfway, away)) = grid.next(from.cell, step) else {
+        for direction in 0..STEPS.len() {
+            let Some(step) = step(grid.ground, from.cell, direction) else {
                 continue;
             };
-            let climb = 0.5 * away * grid.climb;
-            let middle = common(wider(from.heights, climb), grid.within(halfway));
-            if !is_empty(middle) {
-                self.reach(Reached {
-                    cell: next,
-                    heights: common(wider(middle, climb), grid.allowed(next)),
-                    length: from.length + away,
-                    before: Some(own),
-                });
+            let climb = 0.5 * step.away * grid.climb;
+            let middle = common(wider(from.heights, climb), grid.within(step.halfway));
+            if is_empty(middle) {
+                continue;
             }
+            let heights = common(wider(middle, climb), grid.allowed(step.to));
+            let cells = [from.cell, step.to].map(|cell| self.number(cell));
+            let cost = step.away * grid.tolls.per_metre(heights, grid.allowed(step.to))
+                + grid.tolls.exposure(cells, direction);
+            self.reach(Reached {
+                cell: step.to,
+                heights,
+                cost: from.cost + cost,
+                before: Some(own),
+            });
         }
     }
 

@@ -7,63 +7,66 @@
 
 mod grid;
 mod ground;
+mod tolls;
 
-use super::net::Found;
 use super::steepest;
-use super::thin::thin;
 use crate::cost::Model;
 use crate::geometry::Point3;
-use crate::planner::price::pricer;
 use crate::scenario::Scenario;
 use grid::Grid;
 use ground::Ground;
+use tolls::Tolls;
 
 /// How steep steps may be, as a share of the steepest climb, and what is kept free of the band below and above, as a
 /// share of it. A route of few legs cuts corners, and needs some room.
 const ROOM: [[f64; 2]; 3] = [[0.97, 0.0], [0.97, 0.2], [0.8, 0.2]];
 
-/// Maximum number of places kept of a way.
-const PLACES: usize = 120;
+/// Ways along ledges.
+#[derive(Default)]
+pub(in crate::planner) struct Ledges {
+    /// From start to target, of many places, each with more room than the one before.
+    pub(in crate::planner) ways: Vec<Vec<Point3>>,
+    /// Legs priced to find them.
+    pub(in crate::planner) legs_priced: u64,
+}
 
-/// Routes along the shortest ways over the grid. Once `is_over`, those found so far.
-pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
-    let scenario = model.scenario;
-    let mut found = Found::default();
-    if scenario.terrain.is_flat() {
-        return found;
-    }
-    let Some(ground) = Ground::new(model, is_over) else {
-        return found;
+/// The cheapest ways over the grid, of those that cost no more than `most`. Once `is_over`, those found so far.
+pub(in crate::planner) fn ledges(model: &Model, most: f64, is_over: &dyn Fn() -> bool) -> Ledges {
+    let grounds = || {
+        let ground = Ground::new(model, is_over)?;
+        let tolls = Tolls::new(model, &ground, is_over)?;
+        Some((ground, tolls))
     };
-    let pricer = pricer(model).verdicts();
-    for grid in grids(scenario, &ground) {
-        if is_over() {
-            break;
-        }
-        if let Some(way) = grid.shortest(is_over) {
-            let places = thinned_out(&way, PLACES);
-            let (route, legs_priced) = thin(model, &pricer, &places);
-            let even = thinned_out(&way, scenario.planner.waypoints);
-            found.routes.extend([route, even]);
-            found.legs_priced += legs_priced;
-        }
+    if model.scenario.terrain.is_flat() {
+        return Ledges::default();
     }
-    found
+    let Some((ground, tolls)) = grounds() else {
+        return Ledges::default();
+    };
+    let grids = grids(model.scenario, &ground, &tolls);
+    Ledges {
+        ways: grids
+            .iter()
+            .filter_map(|grid| grid.cheapest(most, is_over))
+            .collect(),
+        legs_priced: tolls.legs_priced,
+    }
 }
 
 /// The same grid with ever more room.
-fn grids<'g>(scenario: &Scenario, ground: &'g Ground) -> [Grid<'g>; 3] {
+fn grids<'g>(scenario: &Scenario, ground: &'g Ground, tolls: &'g Tolls) -> [Grid<'g>; 3] {
     let band = scenario.altitude.max - scenario.altitude.min;
     ROOM.map(|[steep, margin]| Grid {
         ground,
+        tolls,
         ends: [scenario.start, scenario.target],
         climb: steep * steepest(scenario),
         margin: margin * band,
     })
 }
 
-/// About `most` places of a way, evenly.
-fn thinned_out(way: &[Point3], most: usize) -> Vec<Point3> {
+/// About `most` free places of a way, evenly.
+pub(in crate::planner) fn thinned_out(way: &[Point3], most: usize) -> Vec<Point3> {
     let last = way.len() - 1;
     let legs = last.min(most + 1);
     (0..=legs).map(|idx| way[idx * last / legs]).collect()
@@ -74,25 +77,32 @@ mod tests {
     use std::cell::Cell;
 
     use super::*;
-    use crate::planner::tests::{mountain, scenario, wall};
+    use crate::planner::tests::{disc, hilly_scenario, mountain, scenario, wall};
+
+    const ANY: f64 = f64::INFINITY;
 
     fn ways(scenario: &Scenario, examine: impl Fn(&Model, f64, Option<Vec<Point3>>)) {
         let model = Model::new(scenario);
         let ground = Ground::new(&model, &|| false).expect("few corners");
-        for grid in grids(scenario, &ground) {
-            examine(&model, grid.climb, grid.shortest(&|| false));
+        let tolls = Tolls::new(&model, &ground, &|| false).expect("enough time");
+        for grid in grids(scenario, &ground, &tolls) {
+            examine(&model, grid.climb, grid.cheapest(ANY, &|| false));
         }
+    }
+
+    fn found(scenario: &Scenario, most: f64) -> Vec<Vec<Point3>> {
+        ledges(&Model::new(scenario), most, &|| false).ways
     }
 
     #[test]
     fn ways_climb_as_steeply_as_they_may_and_stay_in_the_band() {
         for is_down in [true, false] {
             let scenario = mountain(250.0, is_down);
-            let found = Cell::new(0);
+            let count = Cell::new(0);
             ways(&scenario, |model, climb, way| {
                 // With much room there may be none.
                 let Some(way) = way else { return };
-                found.set(found.get() + 1);
+                count.set(count.get() + 1);
                 assert_eq!(
                     [way[0], way[way.len() - 1]],
                     [scenario.start, scenario.target]
@@ -110,9 +120,8 @@ mod tests {
                     assert!((floor - 1e-6..=ceiling + 1e-6).contains(&height), "{place}");
                 }
             });
-            assert!(found.get() > 0);
-            let routes = routes(&Model::new(&scenario), &|| false).routes;
-            assert_eq!(routes.len(), 2 * found.get());
+            assert!(count.get() > 0);
+            assert_eq!(found(&scenario, ANY).len(), count.get());
         }
     }
 
@@ -124,14 +133,31 @@ mod tests {
         ways(&scenario, |_, _, way| assert_eq!(way, None));
     }
 
+    /// Where it costs something, a way keeps clear of the whole soft zone; else it leads past the disc itself.
     #[test]
-    fn level_ground_has_no_ledges_and_a_stop_is_heard() {
-        assert!(
-            routes(&Model::new(&scenario()), &|| false)
-                .routes
-                .is_empty()
-        );
+    fn ways_avoid_exposure_where_it_is_expensive() {
+        let mut scenario = hilly_scenario();
+        let way = scenario.target - scenario.start;
+        let middle = (scenario.start + 0.5 * way).xy();
+        scenario.threats = vec![disc([middle.x, middle.y, 60.0, 120.0])];
+        let mut nearest = |weight: f64| {
+            scenario.weights.threat = weight;
+            let ways = found(&scenario, ANY);
+            let away = ways[0].iter().map(|place| (place.xy() - middle).norm());
+            away.fold(f64::INFINITY, f64::min)
+        };
+        let (free, dear) = (nearest(0.0), nearest(10.0));
+        assert!((60.0..90.0).contains(&free), "{free}");
+        assert!(dear > 110.0, "{dear}");
+    }
+
+    #[test]
+    fn level_ground_has_no_ledges_a_stop_is_heard_and_what_costs_too_much_is_not_sought() {
+        assert!(found(&scenario(), ANY).is_empty());
         let scenario = mountain(250.0, true);
-        assert!(routes(&Model::new(&scenario), &|| true).routes.is_empty());
+        let model = Model::new(&scenario);
+        assert!(ledges(&model, ANY, &|| true).ways.is_empty());
+        let direct = crate::cost::metre(&scenario) * scenario.direct();
+        assert!(found(&scenario, 0.9 * direct).is_empty());
     }
 }

@@ -73,7 +73,7 @@ pub enum DemError {
     },
     /// An impossible elevation: most often an undeclared no-data value.
     #[error(
-        "row {row}, column {column} holds {value} m, must be within -12000 to 12000 m; is it a no-data value that the file does not declare?"
+        "row {row}, column {column} holds {value} m, must be within -12000 to 12000 m and not -9999; is it a no-data value that the file does not declare?"
     )]
     Elevation {
         /// From the top, starting at 0.

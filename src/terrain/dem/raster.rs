@@ -8,6 +8,9 @@ use super::{DemError, Lattice};
 /// Lowest and highest elevation accepted, metres; the deepest sea and the highest land are within.
 const BELIEVED: [f64; 2] = [-12_000.0, 12_000.0];
 
+/// Within them, but written where nothing is known far oftener than it is the depth of a trench.
+const UNKNOWN: f32 = -9999.0;
+
 /// Rows and columns of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Span {
@@ -141,8 +144,10 @@ fn narrow(value: f64) -> f32 {
 
 /// Refuse impossible elevations.
 pub(super) fn check_elevations(row: usize, column: usize, samples: &[f32]) -> Result<(), DemError> {
-    let doubtful =
-        |value: f32| !(value.is_nan() || (BELIEVED[0]..=BELIEVED[1]).contains(&f64::from(value)));
+    let is_believed = |value: f32| {
+        (BELIEVED[0]..=BELIEVED[1]).contains(&f64::from(value)) && value.total_cmp(&UNKNOWN).is_ne()
+    };
+    let doubtful = |value: f32| !(value.is_nan() || is_believed(value));
     match samples.iter().position(|value| doubtful(*value)) {
         Some(at) => Err(DemError::Elevation {
             row,

@@ -83,6 +83,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("jpeg.tif", right().with(tiff::COMPRESSION, Short(vec![7])).bytes(), "scheme 7"),
         ("unknown-scheme.tif", right().with(tiff::COMPRESSION, Short(vec![34_925])).bytes(), "not a valid GeoTIFF"),
         ("infinite.tif", samples(f32::INFINITY), "inf m"),
+        ("nines.tif", samples(-9999.0), "holds -9999 m, must be within -12000 to 12000 m and not -9999"),
         ("undeclared.tif", samples(-32768.0), "is it a no-data value that the file does not declare?"),
         ("scaled.tif", right().with(tiff::GDAL_METADATA, Ascii("<GDALMetadata><Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.1</Item></GDALMetadata>")).bytes(), "scaled or shifted"),
         ("feet.tif", right().with(tiff::KEYS, Short(vec![1, 1, 0, 3, 1024, 0, 1, 2, 2048, 0, 1, 4326, 4099, 0, 1, 9002])).bytes(), "EPSG:9002"),

@@ -237,14 +237,17 @@ fn volumes_of_ed_269_are_read() {
             volume(json!(0), "AGL", "M", disc.clone()),
             volume(json!(1000), "AMSL", "FT", json!({"type": "Polygon", "coordinates": [ring]})),
         ]},
-        {"identifier": "A2", "restriction": "PROHIBITED", "geometry": [volume(json!(50), "AGL", "M", disc.clone())]},
+        {"identifier": "A2", "restriction": "PROHIBITED", "geometry": [
+            volume(json!(50), "AGL", "M", disc.clone()),
+            volume(json!("300"), "AMSL", "M", disc.clone()),
+        ]},
         {"identifier": "A3", "restriction": "NO_RESTRICTION", "geometry": [volume(json!(0), "AGL", "M", disc)]},
         {"identifier": "A4", "restriction": "PROHIBITED", "geometry": [volume(json!(0), "AGL", "M", json!({"type": "Line"}))]},
     ]});
     let read = zones(&file.to_string());
     let threats = &read.scenario["threats"];
     assert_eq!(read.scenario["name"], "zones");
-    assert_eq!(threats.as_array().map(Vec::len), Some(3));
+    assert_eq!(threats.as_array().map(Vec::len), Some(4));
     assert_eq!(
         threats[0],
         json!({"kind": "cylinder", "name": "Airport", "center": {"lat": 47.4, "lon": 8.5}, "radius": 750.5,
@@ -254,7 +257,11 @@ fn volumes_of_ed_269_are_read() {
     assert_eq!(threats[1]["top"], 609.6);
     assert_eq!(threats[1]["vertices"].as_array().map(Vec::len), Some(3));
     assert_eq!(threats[2]["name"], "A2");
-    assert_eq!(threats[2]["base"], json!(null));
+    // Above ground, and no number.
+    assert_eq!(
+        [&threats[2]["base"], &threats[3]["base"]],
+        [&json!(null); 2]
+    );
     assert_eq!(
         unused(&read),
         [
@@ -262,7 +269,7 @@ fn volumes_of_ed_269_are_read() {
             "/features/3/geometry/0: a horizontal projection that is neither a Circle nor a Polygon",
         ]
     );
-    assert!(of_threats(&read)[0].starts_with("1 of them without a base"));
+    assert!(of_threats(&read)[0].starts_with("2 of them without a base"));
 }
 
 #[test]

@@ -50,7 +50,7 @@ fn zone(draft: &mut Draft, at: &str, feature: &Value) {
         let limit = |end: &str| {
             let from = volume[format!("{end}VerticalReference")].as_str();
             let unit = volume["uomDimensions"].as_str().unwrap_or("M");
-            let limit = volume[format!("{end}Limit")].as_f64();
+            let limit = &volume[format!("{end}Limit")];
             Height::measured(limit, unit, from.unwrap_or_default())
         };
         let outlines = outlines(draft, &volume["horizontalProjection"]);

@@ -72,7 +72,7 @@ fn geometry(draft: &mut Draft, at: &str, name: Option<&str>, value: &Value, dept
     let limit = |end: &str| {
         let from = layer[format!("{end}Reference")].as_str();
         let unit = layer["uom"].as_str().unwrap_or("m");
-        Height::measured(layer[end].as_f64(), unit, from.unwrap_or_default())
+        Height::measured(&layer[end], unit, from.unwrap_or_default())
     };
     super::add(draft, at, name, outlines, [limit("lower"), limit("upper")]);
 }

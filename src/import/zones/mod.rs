@@ -9,6 +9,8 @@ pub(super) mod ed269;
 pub(super) mod ed318;
 pub(super) mod openair;
 
+use serde_json::Value;
+
 use super::draft::Draft;
 use super::facts::begin;
 use super::place::Place;
@@ -31,7 +33,7 @@ enum Height {
     AboveSea(f64),
     /// A flight level: metres above mean sea level in the standard atmosphere.
     Level(f64),
-    /// Above ground, or above something else that is not known here.
+    /// Above ground, or above something else that is not known here, or no number.
     Unknown,
 }
 
@@ -77,9 +79,13 @@ impl Height {
     }
 
     /// By a number and the names of its unit and of what it is measured from, as EUROCAE's formats have them.
-    fn measured(limit: Option<f64>, unit: &str, from: &str) -> Self {
-        let Some(limit) = limit else {
-            return Self::Open;
+    fn measured(limit: &Value, unit: &str, from: &str) -> Self {
+        let Some(limit) = limit.as_f64() else {
+            return if limit.is_null() {
+                Self::Open
+            } else {
+                Self::Unknown
+            };
         };
         match (from, unit.to_ascii_uppercase().as_str()) {
             ("AMSL", "M") => Self::AboveSea(limit),

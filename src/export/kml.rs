@@ -92,7 +92,7 @@ fn waypoint(delivery: &Delivery, index: usize) -> Placemark {
 }
 
 /// A wall from the threat's top down to the ground, because KML has no floating volume. A threat without top ends at
-/// the highest point of the route, or at its base where that is higher.
+/// the highest point of the route; where its base is higher, as a lid there: all below it may be flown.
 fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Placemark {
     let chart = delivery.chart();
     let course = delivery.course().iter();
@@ -103,6 +103,7 @@ fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Placemark {
     let height = |z: f64| chart.msl_m(Point3::new(middle.x, middle.y, z));
     let base = threat.base.map_or(f64::MIN, height);
     let top = threat.top.map_or(highest.max(base), height);
+    let is_lid = threat.top.is_none() && base >= highest;
     let corner = |corner: Point2| {
         let LatLon { lat, lon } = chart.place(corner);
         Coord::new(lon, lat, Some(top))
@@ -130,7 +131,7 @@ fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Placemark {
         Some("#threat"),
         &data,
         Geometry::Polygon(Polygon {
-            extrude: true,
+            extrude: !is_lid,
             altitude_mode: AltitudeMode::Absolute,
             outer: LinearRing {
                 coords,

@@ -132,6 +132,21 @@ fn each_format_of_a_plan() {
     }
 }
 
+/// All below the base of what has no top may be flown.
+#[test]
+fn a_threat_above_the_route_is_a_lid_in_kml() {
+    let mut document = scenario();
+    document["threats"][0]["base"] = 560.into();
+    let text = write(&plan(&document, &AROUND), "kml", &[]).expect("a plan");
+    let read = roxmltree::Document::parse(&text).expect("well-formed");
+    let walls = read
+        .descendants()
+        .filter(|node| node.has_tag_name("Polygon"));
+    let extruded = walls.map(|wall| wall.first_element_child()?.text());
+    assert_eq!(extruded.collect::<Vec<_>>(), [Some("0"), Some("1")]);
+    assert!(text.contains(",560\n"));
+}
+
 #[test]
 fn the_result_itself_is_not_touched() {
     let plan = plan(&scenario(), &AROUND);

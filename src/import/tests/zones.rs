@@ -224,6 +224,25 @@ fn an_outline_that_crosses_itself_becomes_its_hull() {
     );
 }
 
+/// 900 m are 2952.76 feet, of which the library makes 2953, and 1500 m 4921.26, 4921.
+#[test]
+fn limits_in_metres_lose_nothing_of_an_airspace() {
+    let corners =
+        "DP 47:20:00 N 008:30:00 E\nDP 47:21:00 N 008:30:00 E\nDP 47:21:00 N 008:31:00 E\n";
+    let within = |limits: &str| {
+        let read = zones(&format!("AC R\nAN metres\n{limits}{corners}"));
+        let threat = &read.scenario["threats"][0];
+        [&threat["base"], &threat["top"]].map(|limit| limit.as_f64().expect("a limit"))
+    };
+    for limits in ["AL 900m\nAH 1500 m\n", "AL 900 M AMSL\nAH 1500M\n"] {
+        let [base, top] = within(limits);
+        assert!((899.8..=900.0).contains(&base), "{base}");
+        assert!((1500.0..=1500.2).contains(&top), "{top}");
+    }
+    let [base, top] = within("AL 2953ft MSL\nAH 4921ft MSL\n");
+    assert!((base - 900.0744).abs() < 1e-3 && (top - 1499.9208).abs() < 1e-3);
+}
+
 #[test]
 fn volumes_of_ed_269_are_read() {
     let volume = |lower: Value, from: &str, unit: &str, projection: Value| {

@@ -51,7 +51,7 @@ pub(in super::super) fn convert(
         let mut read = openair::parse(lines.as_bytes());
         let at = format!("line {row}");
         match read.next() {
-            Some(Ok(airspace)) => add(&mut draft, &at, &airspace),
+            Some(Ok(airspace)) => add(&mut draft, &at, &airspace, lines),
             Some(Err(reason)) => draft.leave(at, reason),
             None => draft.leave(at, "no airspace"),
         }
@@ -78,7 +78,8 @@ fn airspaces(text: &str) -> Vec<(usize, &str)> {
     begins.iter().zip(ends).map(of).collect()
 }
 
-fn add(draft: &mut Draft, at: &str, airspace: &Airspace) {
+/// Add an airspace, which was read from these `lines`.
+fn add(draft: &mut Draft, at: &str, airspace: &Airspace, lines: &str) {
     let at = match &airspace.name {
         Some(name) => format!("{at}: {}", super::super::facts::begin(name)),
         None => at.to_owned(),
@@ -91,8 +92,24 @@ fn add(draft: &mut Draft, at: &str, airspace: &Airspace) {
         Err(Unread::Elsewhere) => return,
         Err(Unread::Amiss(reason)) => Err(reason),
     };
-    let heights = [&airspace.lower_bound, &airspace.upper_bound].map(height);
+    let heights = [
+        height(&airspace.lower_bound, -lost(lines, "AL")),
+        height(&airspace.upper_bound, lost(lines, "AH")),
+    ];
     super::add(draft, &at, airspace.name.as_deref(), outlines, heights);
+}
+
+/// How many feet the library may have lost of a height that a `record` gives, at most: it rounds metres to whole feet.
+fn lost(lines: &str, record: &str) -> f64 {
+    let mut heights = lines
+        .lines()
+        .filter_map(|line| line.trim_start().strip_prefix(record));
+    let is_in_metres = |height: &str| {
+        let unit = height.trim_start_matches(|sign: char| !sign.is_ascii_alphabetic());
+        let rest = unit.strip_prefix(['m', 'M']);
+        rest.is_some_and(|rest| !rest.starts_with(|sign: char| sign.is_ascii_alphabetic()))
+    };
+    if heights.any(is_in_metres) { 0.5 } else { 0.0 }
 }
 
 /// Why an airspace need not be kept clear of, if so. The type, where there is one, says more than the class.
@@ -121,10 +138,11 @@ fn open(airspace: &Airspace) -> Option<&'static str> {
     }
 }
 
-fn height(altitude: &Altitude) -> Height {
+/// The height with so many feet `more` where it is one above mean sea level.
+fn height(altitude: &Altitude, more: f64) -> Height {
     match altitude {
         Altitude::Gnd | Altitude::Unlimited | Altitude::FeetAgl(0) => Height::Open,
-        Altitude::FeetAmsl(feet) => Height::AboveSea(from_feet(f64::from(*feet))),
+        Altitude::FeetAmsl(feet) => Height::AboveSea(from_feet(f64::from(*feet) + more)),
         Altitude::FlightLevel(level) => Height::Level(from_feet(f64::from(*level) * 100.0)),
         Altitude::FeetAgl(_) | Altitude::Other(_) => Height::Unknown,
     }

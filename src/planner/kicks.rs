@@ -9,7 +9,7 @@ use super::doubt::is_proven;
 use super::finish::refine;
 use super::log::Log;
 use super::polish::{Polish, Steps};
-use super::{StopReason, is_from_scratch, newton, why_stop};
+use super::{MOST_WAYPOINTS, StopReason, is_from_scratch, newton, why_stop};
 use crate::cost::Model;
 use crate::geometry::{LEVEL, Point3, Vector2};
 use crate::optimizer::{Random, share_of};
@@ -39,9 +39,6 @@ const SPREAD: [f64; 4] = [
 
 /// A route that costs this share more than the best after the rough polish is dropped: Newton's method gains little.
 const CLOSE: f64 = 0.02;
-
-/// Where more waypoints than this are requested, nothing is tried: it would take long.
-const MOST_WAYPOINTS: usize = 64;
 
 const ROUGH_STEPS: Steps = Steps {
     from: 0.02,

@@ -147,6 +147,10 @@ fn search(model: &Model, log: &mut Log) -> StopReason {
     }
 }
 
+/// Where more waypoints than this are requested, only the other direction is tried: the rest would take long, and so many
+/// are hardly ever too few.
+const MOST_WAYPOINTS: usize = 64;
+
 /// After the last iteration: search in other ways too where that promises a better route, given that none costs less
 /// than `lower`.
 fn search_on(model: &Model, lower: f64, log: &mut Log) -> StopReason {

@@ -9,7 +9,7 @@ use super::backwards::WIDE_TURNS_DEG;
 use super::doubt::is_doubtful;
 use super::finish::finish_from;
 use super::log::Log;
-use super::{StopReason, is_from_scratch, newton, starts};
+use super::{MOST_WAYPOINTS, StopReason, is_from_scratch, newton, starts};
 use crate::cost::{Model, turns};
 use crate::geometry::Point3;
 use crate::scenario::Scenario;
@@ -21,9 +21,6 @@ const SHARES: [f64; 2] = [0.8, 1.2];
 /// A number beside those over level ground, where threats may be passed above or below: with so few waypoints all ways that
 /// lead elsewhere are polished. One over a threat and under the next mostly breaks limits before it is.
 const FEW: usize = 5;
-
-/// Where more waypoints than this are requested, nothing is tried: it would take long.
-const MOST: usize = 64;
 
 /// Whether a search that ended with the best route of `log` is worth others, given that no route costs less than `lower`.
 pub(super) fn is_worthwhile(model: &Model, lower: f64, log: &Log) -> bool {
@@ -37,7 +34,7 @@ pub(super) fn is_worthwhile(model: &Model, lower: f64, log: &Log) -> bool {
         }
     };
     is_from_scratch(model.scenario)
-        && model.scenario.planner.waypoints <= MOST
+        && model.scenario.planner.waypoints <= MOST_WAYPOINTS
         && log.best.is_feasible()
         && are_ways_missed()
 }
@@ -234,7 +231,9 @@ mod tests {
         assert!(!but(|scenario| {
             scenario.terrain = Terrain::Flat(Flat { elevation: 0.0 });
         }));
-        assert!(!but(|scenario| scenario.planner.waypoints = MOST + 1));
+        assert!(!but(
+            |scenario| scenario.planner.waypoints = MOST_WAYPOINTS + 1
+        ));
         assert!(!but(
             |scenario| scenario.vehicle.max_turn_deg = WIDE_TURNS_DEG + 1.0
         ));

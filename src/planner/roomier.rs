@@ -5,7 +5,7 @@ use super::aside::aside_with;
 use super::fewer::leave_out;
 use super::finish::{Leads, finish};
 use super::log::Log;
-use super::{StopReason, starts, why_stop};
+use super::{MOST_WAYPOINTS, StopReason, starts, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
 
@@ -15,16 +15,12 @@ const ATTEMPTS: [f64; 2] = [1.4, 2.0];
 /// An attempt uses at least this many waypoints more than requested.
 const MORE: usize = 3;
 
-/// Where more waypoints than this are requested nothing is tried: they hardly ever lack waypoints, and removing some
-/// would take long.
-const MOST: usize = 64;
-
 /// Whether a search from routes, which ended with the best one of `log`, may still find one that keeps every limit.
 pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
     let settings = &model.scenario.planner;
     starts::are_wanted(model.scenario)
         && settings.polish
-        && settings.waypoints <= MOST
+        && settings.waypoints <= MOST_WAYPOINTS
         && !log.best.is_feasible()
 }
 

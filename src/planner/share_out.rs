@@ -6,7 +6,7 @@ use super::finish::refine;
 use super::log::Log;
 use super::newton::{self, dealt};
 use super::recount::circles;
-use super::{StopReason, is_from_scratch, why_stop};
+use super::{MOST_WAYPOINTS, StopReason, is_from_scratch, why_stop};
 use crate::cost::Model;
 
 /// Waypoints that are put on the longest leg in turn, those first that make the route longer by least.
@@ -15,15 +15,12 @@ const SPARES: usize = 8;
 /// Gain of putting one there that is worth doing it again, as a share of the cost.
 const WORTH: f64 = 1e-3;
 
-/// Where more waypoints than this are requested, nothing is tried: it would take long.
-const MOST: usize = 64;
-
 /// Whether a search that ended with the best route of `log` is worth it.
 pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
     let scenario = model.scenario;
     is_from_scratch(scenario)
         && !scenario.terrain.is_flat()
-        && scenario.planner.waypoints <= MOST
+        && scenario.planner.waypoints <= MOST_WAYPOINTS
         && log.best.is_feasible()
         && (circles(&log.route) || newton::is_felt(model, &log.route))
 }
@@ -183,7 +180,7 @@ mod tests {
         }));
         assert!(!worthwhile_but(|scenario| scenario.planner.polish = false));
         assert!(!worthwhile_but(|scenario| {
-            scenario.planner.waypoints = MOST + 1;
+            scenario.planner.waypoints = MOST_WAYPOINTS + 1;
         }));
         // A route that breaks a limit is another search's.
         assert!(!worthwhile_but(

@@ -6,15 +6,12 @@ use super::doubt::is_proven;
 use super::fewer::leave_out_quickly;
 use super::finish::finish_from;
 use super::log::Log;
-use super::{Nobody, StopReason, is_from_scratch, newton, starts, why_stop};
+use super::{MOST_WAYPOINTS, Nobody, StopReason, is_from_scratch, newton, starts, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
 
 /// How many times the requested number of waypoints a way keeps at first.
 const TIMES: [usize; 2] = [2, 4];
-
-/// Where more waypoints than this are requested, nothing is tried: it would take long.
-const MOST: usize = 64;
 
 /// A way this many times as expensive as the best route is not worth a look: pulling it into place makes it cheaper by that
 /// much at most.
@@ -28,7 +25,7 @@ pub(super) fn is_worthwhile(model: &Model, lower: f64, log: &Log) -> bool {
         || !log.best.is_feasible() || !is_proven(lower, log) && newton::is_felt(model, &log.route);
     is_from_scratch(scenario)
         && !scenario.terrain.is_flat()
-        && scenario.planner.waypoints <= MOST
+        && scenario.planner.waypoints <= MOST_WAYPOINTS
         && are_ways_missed()
 }
 
@@ -156,7 +153,7 @@ mod tests {
             scenario.planner.warm_start = Some(WarmStart::Waypoints(Vec::new()));
         }));
         assert!(!worthwhile_but(|scenario| {
-            scenario.planner.waypoints = MOST + 1;
+            scenario.planner.waypoints = MOST_WAYPOINTS + 1;
         }));
         // Found, but far from every limit, or proven.
         let scenario = down_a_mountain();

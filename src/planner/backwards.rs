@@ -45,20 +45,12 @@ mod tests {
     use super::*;
     use crate::geometry::Point3;
     use crate::planner::tests::{
-        disc, hilly_scenario, mountain, scenario as level_scenario, search_briefly, soft_wall, wall,
+        disc, hilly_scenario, mountain, scenario as level_scenario, search_briefly, soft_wall,
+        straight, wall,
     };
     use crate::planner::{self, Nobody, plan};
     use crate::scenario::{Scenario, Seeding, WarmStart};
     use crate::seeding::lower_bound;
-
-    /// Evenly spaced, at the heights between start and target.
-    fn straight(scenario: &Scenario) -> Vec<Point3> {
-        let legs = scenario.planner.waypoints + 1;
-        let way = scenario.target - scenario.start;
-        (0..=legs)
-            .map(|idx| scenario.start + way * (idx as f64 / legs as f64))
-            .collect()
-    }
 
     #[test]
     fn what_is_found_in_the_other_direction_leads_from_start_to_target() {

@@ -5,11 +5,11 @@
 //! coarser than the difference, and between the two all routes break limits or cost more, so that no small change of one
 //! leads to the other.
 
-use super::doubt::is_proven;
+use super::doubt::is_hard_pressed;
 use super::finish::refine;
 use super::log::Log;
 use super::polish::{Polish, Steps};
-use super::{MOST_WAYPOINTS, StopReason, is_from_scratch, newton, why_stop};
+use super::{MOST_WAYPOINTS, StopReason, is_from_scratch, why_stop};
 use crate::cost::Model;
 use crate::geometry::{LEVEL, Point3, Vector2};
 use crate::optimizer::{Random, share_of};
@@ -50,11 +50,9 @@ const ROUGH_STEPS: Steps = Steps {
 pub(super) fn is_worthwhile(model: &Model, lower: f64, log: &Log) -> bool {
     let scenario = model.scenario;
     is_from_scratch(scenario)
-        && !scenario.terrain.is_flat()
         && scenario.planner.waypoints <= MOST_WAYPOINTS
         && log.best.is_feasible()
-        && !is_proven(lower, log)
-        && newton::is_felt(model, &log.route)
+        && is_hard_pressed(model, lower, log)
 }
 
 /// Kick the best route of `log` while that makes it better.

@@ -2,11 +2,11 @@
 //! them. The cheapest ways over a fine grid, which follow ledges and cross ridges where these are low, are pulled into
 //! place with more waypoints than requested, and then lose one after the other.
 
-use super::doubt::is_proven;
+use super::doubt::is_hard_pressed;
 use super::fewer::leave_out_quickly;
 use super::finish::finish_from;
 use super::log::Log;
-use super::{MOST_WAYPOINTS, Nobody, StopReason, is_from_scratch, newton, starts, why_stop};
+use super::{MOST_WAYPOINTS, Nobody, StopReason, is_from_scratch, starts, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
 
@@ -21,12 +21,10 @@ const PROMISING: f64 = 1.25;
 /// limits of the vehicle, and another may be much cheaper.
 pub(super) fn is_worthwhile(model: &Model, lower: f64, log: &Log) -> bool {
     let scenario = model.scenario;
-    let are_ways_missed =
-        || !log.best.is_feasible() || !is_proven(lower, log) && newton::is_felt(model, &log.route);
     is_from_scratch(scenario)
         && !scenario.terrain.is_flat()
         && scenario.planner.waypoints <= MOST_WAYPOINTS
-        && are_ways_missed()
+        && (!log.best.is_feasible() || is_hard_pressed(model, lower, log))
 }
 
 /// Follow ways along ledges, and keep what comes of them if it is better than the best route of `log`.
@@ -43,11 +41,16 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     let ledges = starts::ledges(model, most, &is_over);
     log.evaluations += ledges.legs_priced / (waypoints as u64 + 1);
     for way in &ledges.ways {
-        for times in TIMES {
+        let mut routes = TIMES
+            .map(|times| starts::thinned_out(way, times * waypoints))
+            .to_vec();
+        // Where a way has few places, all of them are kept either way.
+        routes.dedup();
+        for route in routes {
             if let Some(reason) = why_stop(model.scenario, log.stop) {
                 return reason;
             }
-            let Some(route) = pulled_into_place(model, way, times * waypoints, log) else {
+            let Some(route) = pulled_into_place(model, route, log) else {
                 continue;
             };
             match leave_out_quickly(model, route, log) {
@@ -64,14 +67,8 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     StopReason::Iterations
 }
 
-/// The route along `way` with so many waypoints, or all its places if these are fewer, if it keeps every limit.
-fn pulled_into_place(
-    model: &Model,
-    way: &[Point3],
-    waypoints: usize,
-    log: &mut Log,
-) -> Option<Vec<Point3>> {
-    let route = starts::thinned_out(way, waypoints);
+/// What becomes of `route` with as many waypoints as it has, if that keeps every limit.
+fn pulled_into_place(model: &Model, route: Vec<Point3>, log: &mut Log) -> Option<Vec<Point3>> {
     let mut scenario = model.scenario.clone();
     scenario.planner.waypoints = route.len() - 2;
     let long = Model::new(&scenario);
@@ -85,7 +82,8 @@ fn pulled_into_place(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::planner::tests::{Looks, mountain};
+    use crate::planner::newton;
+    use crate::planner::tests::{Looks, mountain, straight};
     use crate::scenario::{Scenario, WarmStart};
     use crate::terrain::{Flat, Terrain};
 
@@ -94,13 +92,6 @@ mod tests {
         let mut scenario = mountain(250.0, true);
         scenario.planner.waypoints = 20;
         scenario
-    }
-
-    fn straight(scenario: &Scenario) -> Vec<Point3> {
-        let legs = scenario.planner.waypoints + 1;
-        let way = scenario.target - scenario.start;
-        let at = |idx: usize| scenario.start + way * (idx as f64 / legs as f64);
-        (0..=legs).map(at).collect()
     }
 
     #[test]
@@ -155,7 +146,7 @@ mod tests {
         assert!(!worthwhile_but(|scenario| {
             scenario.planner.waypoints = MOST_WAYPOINTS + 1;
         }));
-        // Found, but far from every limit, or proven.
+        // Found, at the limits of the vehicle: it depends on what is proven.
         let scenario = down_a_mountain();
         let model = Model::new(&scenario);
         let mut nobody = Nobody;

@@ -216,3 +216,12 @@ pub(in crate::planner) fn slalom() -> Scenario {
     scenario.planner.polish = true;
     scenario
 }
+
+/// Evenly spaced waypoints on the straight way.
+pub(in crate::planner) fn straight(scenario: &Scenario) -> Vec<Point3> {
+    let legs = scenario.planner.waypoints + 1;
+    let way = scenario.target - scenario.start;
+    (0..=legs)
+        .map(|idx| scenario.start + way * (idx as f64 / legs as f64))
+        .collect()
+}

@@ -32,25 +32,19 @@ pub(in crate::planner) struct Ledges {
 
 /// The cheapest ways over the grid, of those that cost no more than `most`. Once `is_over`, those found so far.
 pub(in crate::planner) fn ledges(model: &Model, most: f64, is_over: &dyn Fn() -> bool) -> Ledges {
-    let grounds = || {
+    let scenario = model.scenario;
+    let sought = || {
         let ground = Ground::new(model, is_over)?;
         let tolls = Tolls::new(model, &ground, is_over)?;
-        Some((ground, tolls))
+        let grids = grids(scenario, &ground, &tolls).into_iter();
+        let ways = grids.filter_map(|grid| grid.cheapest(most, is_over));
+        Some(Ledges {
+            ways: ways.collect(),
+            legs_priced: tolls.legs_priced,
+        })
     };
-    if model.scenario.terrain.is_flat() {
-        return Ledges::default();
-    }
-    let Some((ground, tolls)) = grounds() else {
-        return Ledges::default();
-    };
-    let grids = grids(model.scenario, &ground, &tolls);
-    Ledges {
-        ways: grids
-            .iter()
-            .filter_map(|grid| grid.cheapest(most, is_over))
-            .collect(),
-        legs_priced: tolls.legs_priced,
-    }
+    let is_flat = scenario.terrain.is_flat();
+    (!is_flat).then(sought).flatten().unwrap_or_default()
 }
 
 /// The same grid with ever more room.

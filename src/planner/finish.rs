@@ -74,7 +74,9 @@ pub(super) fn finish(
     leads: &Leads,
     log: &mut Log,
 ) -> StopReason {
-    if model.scenario.planner.polish && reason != StopReason::Converged {
+    let is_wanted = model.scenario.planner.polish && reason != StopReason::Converged;
+    // Even looking at what there is takes long beside rings of thousands of corners.
+    if is_wanted && why_stop(model.scenario, log.stop).is_none() {
         let mut candidates = vec![log.route.clone()];
         // Where the best so far is still a start of the search, what its bats found may be better once polished.
         candidates.extend(

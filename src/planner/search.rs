@@ -50,7 +50,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         0
     };
     let whole = |routes: Vec<Vec<Point3>>, log: &mut Log| -> Vec<Vec<Point3>> {
-        let with_all = |route| starts::with_waypoints(model, route, settings.waypoints);
+        let with_all = |route| with_all(model, route, log);
         let routes: Vec<_> = routes.into_iter().map(with_all).collect();
         for route in &routes {
             log.offer_unpriced(route);
@@ -131,7 +131,7 @@ fn run(
             if route.len() == settings.waypoints + 2 {
                 log.offer(&route, best);
             } else {
-                log.offer_unpriced(&starts::with_waypoints(model, route, settings.waypoints));
+                log.offer_unpriced(&with_all(model, route, log));
             }
         }
         log.point(iteration, search.swarm());
@@ -157,6 +157,14 @@ fn run(
         note(iteration, search.as_ref(), routes, log);
     }
     (search, StopReason::Iterations)
+}
+
+/// `route` with all its waypoints; where even this takes long, only as long as there is time.
+fn with_all(model: &Model, route: Vec<Point3>, log: &Log) -> Vec<Point3> {
+    let scenario = model.scenario;
+    let is_vast = starts::is_vast(scenario);
+    let is_late = || is_vast && why_stop(scenario, log.stop).is_some();
+    starts::with_waypoints_until(model, route, scenario.planner.waypoints, &is_late)
 }
 
 fn search_settings(model: &Model, algorithm: &Algorithm) -> Settings {

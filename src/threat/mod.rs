@@ -64,6 +64,14 @@ impl Threat {
         }
     }
 
+    /// Number of circles that a string may bend round.
+    pub(crate) fn bends(&self) -> usize {
+        match &self.shape {
+            Shape::Cylinder(_) => 1,
+            Shape::Polygon(polygon) => polygon.vertices().len(),
+        }
+    }
+
     /// Horizontal distance of `point` from the boundary, metres, negative inside, at any height.
     #[must_use]
     pub fn distance(&self, point: Point2) -> f64 {

@@ -168,7 +168,7 @@ mod tests {
     fn the_bow_is_what_a_short_way_is_filled_with() {
         let (scenario, few) = near_ends();
         let model = Model::new(&scenario);
-        let filled = spare::fill(&model, few.clone(), 60);
+        let filled = spare::fill(&model, few.clone(), 60, &|| false);
         assert_eq!(Some(filled), bent(&model, &few, 60));
     }
 

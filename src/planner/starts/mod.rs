@@ -33,7 +33,7 @@ mod ways;
 mod wider;
 mod worth;
 
-pub(super) use count::with_waypoints;
+pub(super) use count::{with_waypoints, with_waypoints_until};
 pub(super) use heap::spread;
 pub(super) use height::steepest;
 pub(super) use known::given;
@@ -152,13 +152,14 @@ fn with_as_many(
 ) -> Vec<(Fitness, Vec<Point3>)> {
     let mut priced: Vec<(Fitness, Vec<Point3>)> = Vec::new();
     let is_scene_vast = is_vast(model.scenario);
+    let is_late = || is_scene_vast && is_over();
     for shape in shapes {
         // The first will do where looking at another takes time that is not there.
         let takes_long = is_scene_vast || shape.len() > LONG;
         if takes_long && !priced.is_empty() && is_over() {
             break;
         }
-        let route = with_waypoints(model, shape, waypoints);
+        let route = with_waypoints_until(model, shape, waypoints, &is_late);
         let is_same = |(_, other): &(Fitness, Vec<Point3>)| same(model.scenario, &route, other);
         if !priced.iter().any(is_same) {
             priced.push((price(model, &route), route));

@@ -34,14 +34,20 @@ const RISES: [&[(f64, bool)]; 5] = [
 /// Costs nearer than this count as equal.
 pub(super) const NOTHING: f64 = 1e-9;
 
-/// `route` with spare waypoints added up to `waypoints`, each where it costs least.
-pub(super) fn fill(model: &Model, route: Vec<Point3>, waypoints: usize) -> Vec<Point3> {
+/// `route` with spare waypoints added up to `waypoints`, each where it costs least; once `is_over`, without a look at
+/// prices.
+pub(super) fn fill(
+    model: &Model,
+    route: Vec<Point3>,
+    waypoints: usize,
+    is_over: &dyn Fn() -> bool,
+) -> Vec<Point3> {
     let spare = waypoints + 2 - route.len();
     if spare < SEVERAL || !model.scenario.terrain.is_flat() {
-        return one_by_one(model, route, waypoints).0;
+        return one_by_one(model, route, waypoints, is_over).0;
     }
-    let (filled, added) = one_by_one(model, route.clone(), waypoints);
-    if added <= dear(model) {
+    let (filled, added) = one_by_one(model, route.clone(), waypoints, is_over);
+    if added <= dear(model) || is_over() {
         return filled;
     }
     let bent = (added > MUCH * price(model, &filled).cost)
@@ -49,7 +55,7 @@ pub(super) fn fill(model: &Model, route: Vec<Point3>, waypoints: usize) -> Vec<P
         .flatten();
     // A waypoint that leaves its leg for the middle of the band is expensive by itself, but may make room for all
     // others.
-    let raised = with_one_raised(model, route, waypoints);
+    let raised = with_one_raised(model, route, waypoints, is_over);
     let better = |one: Vec<Point3>, other: Vec<Point3>| {
         if price(model, &other).beats(&price(model, &one)) {
             other
@@ -61,11 +67,21 @@ pub(super) fn fill(model: &Model, route: Vec<Point3>, waypoints: usize) -> Vec<P
 }
 
 /// Adds each where it costs least given the route so far; returns what they add.
-fn one_by_one(model: &Model, mut route: Vec<Point3>, waypoints: usize) -> (Vec<Point3>, f64) {
-    let mut splits: Vec<Split> = route
-        .windows(2)
-        .map(|ends| Split::of(model, ends[0], ends[1]))
-        .collect();
+fn one_by_one(
+    model: &Model,
+    mut route: Vec<Point3>,
+    waypoints: usize,
+    is_over: &dyn Fn() -> bool,
+) -> (Vec<Point3>, f64) {
+    let split = |a: Point3, b: Point3| {
+        if is_over() {
+            Split::halved(a, b)
+        } else {
+            Split::of(model, a, b)
+        }
+    };
+    let legs = route.windows(2);
+    let mut splits: Vec<Split> = legs.map(|ends| split(ends[0], ends[1])).collect();
     let mut added = 0.0;
     while route.len() < waypoints + 2 {
         let best = (0..splits.len())
@@ -74,19 +90,22 @@ fn one_by_one(model: &Model, mut route: Vec<Point3>, waypoints: usize) -> (Vec<P
         added += splits[best].added.cost;
         route.insert(best + 1, splits[best].at);
         let (before, at, after) = (route[best], route[best + 1], route[best + 2]);
-        splits.splice(
-            best..=best,
-            [Split::of(model, before, at), Split::of(model, at, after)],
-        );
+        splits.splice(best..=best, [split(before, at), split(at, after)]);
     }
     (route, added)
 }
 
 /// As [`one_by_one`], except that the first leaves its leg for the middle of the band, where this costs least.
-fn with_one_raised(model: &Model, mut route: Vec<Point3>, waypoints: usize) -> Vec<Point3> {
+fn with_one_raised(
+    model: &Model,
+    mut route: Vec<Point3>,
+    waypoints: usize,
+    is_over: &dyn Fn() -> bool,
+) -> Vec<Point3> {
     let room = waypoints + 2 - route.len();
     let ways = route.windows(2).enumerate().flat_map(|(leg, ends)| {
         let ways = RISES.iter().filter(move |way| way.len() < room);
+        let ways = ways.take_while(|_| !is_over());
         ways.map(move |way| (leg, raised(model, (ends[0], ends[1]), way)))
     });
     let cheapest = ways.min_by(|(_, (one, _)), (_, (other, _))| one.rank(other));
@@ -94,7 +113,7 @@ fn with_one_raised(model: &Model, mut route: Vec<Point3>, waypoints: usize) -> V
         let onward = route.split_off(leg + 1);
         route.extend(points.into_iter().chain(onward));
     }
-    one_by_one(model, route, waypoints).0
+    one_by_one(model, route, waypoints, is_over).0
 }
 
 /// The leg between `ends` by `way`: the change in fitness, and the points on it.
@@ -164,6 +183,15 @@ impl Split {
         }
     }
 
+    /// In the middle, as if this cost nothing.
+    fn halved(a: Point3, b: Point3) -> Self {
+        Self {
+            at: nalgebra::center(&a, &b),
+            added: Fitness::ZERO,
+            length: (b - a).norm(),
+        }
+    }
+
     /// As near to the middle of the band as the vehicle can climb to and back: for a leg that is high or low from end
     /// to end, as between one threat that is flown over and the next.
     fn off_leg(model: &Model, a: Point3, b: Point3) -> Self {
@@ -223,7 +251,7 @@ mod tests {
         ];
         let before = price(&model, &few);
         for waypoints in [3, 10, 30] {
-            let many = fill(&model, few.clone(), waypoints);
+            let many = fill(&model, few.clone(), waypoints, &|| false);
             assert_eq!(many.len(), waypoints + 2);
             let after = price(&model, &many);
             assert!(
@@ -236,6 +264,22 @@ mod tests {
         }
     }
 
+    /// Where even that takes long.
+    #[test]
+    fn where_time_is_over_spare_waypoints_halve_the_longest_legs() {
+        let scenario = scenario();
+        let model = Model::new(&scenario);
+        let bend = Point3::new(150.0, 400.0, 100.0);
+        let few = vec![scenario.start, bend, scenario.target];
+        let filled = fill(&model, few, 3, &|| true);
+        let half = nalgebra::center(&bend, &scenario.target);
+        let quarter = nalgebra::center(&bend, &half);
+        assert_eq!(
+            filled,
+            [scenario.start, bend, quarter, half, scenario.target]
+        );
+    }
+
     /// Where a leg is above the middle of the band throughout, spare waypoints go down to the middle.
     #[test]
     fn spare_waypoints_leave_a_high_leg() {
@@ -244,7 +288,7 @@ mod tests {
         scenario.threats.clear();
         let model = Model::new(&scenario);
         let high = vec![scenario.start, scenario.target];
-        let many = fill(&model, high.clone(), 10);
+        let many = fill(&model, high.clone(), 10, &|| false);
         let [few, many] = [high, many].map(|route| price(&model, &route));
         assert!(many.violation <= 0.0);
         // Each would cost at least 30 on the leg.
@@ -261,9 +305,9 @@ mod tests {
         scenario.threats.clear();
         let model = Model::new(&scenario);
         let few = vec![scenario.start, scenario.target];
-        let (each_alone, added) = one_by_one(&model, few.clone(), 10);
+        let (each_alone, added) = one_by_one(&model, few.clone(), 10, &|| false);
         assert!(added > 15.0, "{added}");
-        let many = fill(&model, few.clone(), 10);
+        let many = fill(&model, few.clone(), 10, &|| false);
         let [few, each_alone, many] = [few, each_alone, many].map(|route| price(&model, &route));
         assert!(
             many.violation <= 0.0 && many.cost < few.cost + 6.0,

@@ -28,12 +28,14 @@ use std::cell::Cell;
 use super::simpler;
 use crate::geometry::Side;
 use crate::scenario::Scenario;
+use crate::threat::Threat;
 use event::Event;
 use field::{Field, cost_of};
 use least_legs::least_legs;
 pub use potential::{WaysSought, cheap_ways};
 use prices::Prices;
 use promise::promise;
+use wall::Wall;
 
 /// Covers the rounding of the sums behind a bound, so that it holds in floating point too.
 const ROUNDING: f64 = 1e-9;
@@ -100,10 +102,11 @@ pub fn cheapest_slip(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
     if prices.fuel <= 0.0 {
         return f64::INFINITY;
     }
-    let walls = widening::walls(scenario, &prices);
-    if ends::are_too_many(&walls) {
+    // Walls of thousands of corners take a while themselves.
+    if ends::are_too_many(scenario.threats.iter().map(Threat::bends)) {
         return f64::INFINITY;
     }
+    let walls = widening::walls(scenario, &prices);
     let slips = event::gaps(&walls, &prices, stop).unwrap_or_default();
     let costs = slips.iter().map(|slip| slip.cost);
     costs.fold(f64::INFINITY, f64::min)
@@ -233,7 +236,7 @@ fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 
 /// A lower bound from the events one by one and the legs of strings, where no route costs less than `dense` seen from
 /// above; 0 where there are too many corners.
 fn legs(field: &Field, events: &[Event], dense: f64) -> f64 {
-    if ends::are_too_many(field.walls) {
+    if ends::are_too_many(field.walls.iter().map(Wall::bends)) {
         0.0
     } else {
         field.one_by_one(events, dense)

@@ -41,9 +41,9 @@ const STRING: usize = 20;
 /// This many corners of rings take as much effort as a kind of leg.
 const CORNERS: usize = 3;
 
-/// Whether there are too many corners to examine legs.
-pub(super) fn are_too_many(walls: &[Wall]) -> bool {
-    walls.iter().map(Wall::bends).sum::<usize>() > MOST_CORNERS
+/// Whether there are too many corners to examine legs, with so many of each wall.
+pub(super) fn are_too_many(corners: impl Iterator<Item = usize>) -> bool {
+    corners.sum::<usize>() > MOST_CORNERS
 }
 
 /// The first and the last legs of routes round widened walls.
@@ -66,7 +66,7 @@ impl<'a> Legs<'a> {
         least: f64,
         (effort, stop): (usize, &'a dyn Fn() -> bool),
     ) -> Self {
-        let matter = least.is_finite() && !are_too_many(walls);
+        let matter = least.is_finite() && !are_too_many(walls.iter().map(Wall::bends));
         let ends = matter
             .then(|| ends(scenario, prices, (walls, radii), stop))
             .flatten();

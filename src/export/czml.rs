@@ -74,7 +74,7 @@ pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
     packets.extend((0..delivery.waypoints.len()).map(|index| waypoint(delivery, index)));
     let shown = shown_heights(delivery);
     let threats = delivery.scenario.threats.iter().enumerate();
-    packets.extend(threats.map(|(index, threat)| volume(chart, index, threat, shown)));
+    packets.extend(threats.map(|(index, threat)| volume(delivery, index, threat, shown)));
     format!("{}\n", Value::Array(packets))
 }
 
@@ -107,11 +107,15 @@ fn degrees(chart: &Chart, point: Point3) -> [f64; 3] {
     [lon, lat, chart.ellipsoid_m(point)]
 }
 
-fn volume(chart: &Chart, index: usize, threat: &Threat, shown: (f64, f64)) -> Value {
+/// `shown` are the heights between which it is shown at least, where it has no base or top.
+fn volume(delivery: &Delivery, index: usize, threat: &Threat, shown: (f64, f64)) -> Value {
+    let chart = delivery.chart();
     let middle = outline::middle(threat);
     let height = |z: f64| chart.ellipsoid_m(Point3::new(middle.x, middle.y, z));
-    let base = threat.base.map_or(shown.0, height);
-    let top = threat.top.map_or(shown.1.max(base + 10.0), height);
+    let (lowest, highest) = outline::over_ground(&delivery.scenario.terrain, threat);
+    let base = threat.base.map_or(shown.0.min(height(lowest)), height);
+    let highest = shown.1.max(height(highest)).max(base + 10.0);
+    let top = threat.top.map_or(highest, height);
     let (base, top) = (rounded(base.min(top - 1.0), 1e3), rounded(top, 1e3));
     let look = json!({"solidColor": {"color": {"rgba": THREAT}}});
     let mut packet = json!({

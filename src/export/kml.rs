@@ -92,15 +92,17 @@ fn waypoint(delivery: &Delivery, index: usize) -> Placemark {
 }
 
 /// A wall from the threat's top down to the ground, because KML has no floating volume. A threat without top ends at
-/// the highest point of the route; where its base is higher, as a lid there: all below it may be flown.
+/// the highest point of the route, or where it stands out of its ground; where its base is higher, as a lid there: all
+/// below it may be flown.
 fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Placemark {
     let chart = delivery.chart();
     let course = delivery.course().iter();
-    let highest = course
-        .map(|&point| chart.msl_m(point))
-        .fold(f64::MIN, f64::max);
     let middle = outline::middle(threat);
     let height = |z: f64| chart.msl_m(Point3::new(middle.x, middle.y, z));
+    let (_, over_ground) = outline::over_ground(&delivery.scenario.terrain, threat);
+    let highest = course
+        .map(|&point| chart.msl_m(point))
+        .fold(height(over_ground), f64::max);
     let base = threat.base.map_or(f64::MIN, height);
     let top = threat.top.map_or(highest.max(base), height);
     let is_lid = threat.top.is_none() && base >= highest;

@@ -4,6 +4,7 @@ use super::chart::Chart;
 use crate::geometry::geodesy::{LatLon, wrapped};
 use crate::geometry::ring::{edges, twice_area};
 use crate::geometry::{Point2, Rect};
+use crate::terrain::{HeightRange, Terrain};
 use crate::threat::{Shape, Threat};
 
 /// Corners of the ring that represents a circle.
@@ -71,6 +72,22 @@ pub(super) fn ring(threat: &Threat) -> Vec<Point2> {
 pub(super) fn middle(threat: &Threat) -> Point2 {
     let Rect { min, max } = threat.extent();
     nalgebra::center(&min, &max)
+}
+
+/// A threat without base or top is shown from the lowest to so far above the highest ground below it at least, metres.
+const OVER_GROUND_M: f64 = 10.0;
+
+/// Corners of a ring at most below which the ground is looked at.
+const LOOKED_AT: usize = 12;
+
+/// Heights in the frame between which a threat without base or top would not vanish in the ground below it.
+pub(super) fn over_ground(terrain: &Terrain, threat: &Threat) -> (f64, f64) {
+    let ring = ring(threat);
+    let step = ring.len().div_ceil(LOOKED_AT);
+    let places = ring.into_iter().step_by(step).chain([middle(threat)]);
+    let ground = places.map(|at| HeightRange::of(terrain.elevation(at)));
+    let ground = ground.fold(HeightRange::EMPTY, HeightRange::join);
+    (ground.min, ground.max + OVER_GROUND_M)
 }
 
 /// Display name of the threat at `index`.

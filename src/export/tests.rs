@@ -147,6 +147,45 @@ fn a_threat_above_the_route_is_a_lid_in_kml() {
     assert!(text.contains(",560\n"));
 }
 
+/// A mast 250 m above all that the vehicle flies over.
+#[test]
+fn a_threat_on_a_summit_stands_out_of_it() {
+    let mut document = scenario();
+    let summit = json!({"lat": 47.408, "lon": 8.547});
+    document["terrain"] = json!({
+        "kind": "peaks", "base": 488,
+        "peaks": [{"center": summit, "height": 300, "spread": {"x": 100, "y": 100}}],
+    });
+    document["threats"] = json!([{"kind": "cylinder", "center": summit, "radius": 30}]);
+    let plan = plan(&document, &AROUND);
+    let highest = |text: &str| {
+        let numbers = text.split(|c: char| c != '.' && !c.is_ascii_digit());
+        let numbers = numbers.filter_map(|number| number.parse::<f64>().ok());
+        numbers.fold(0.0, f64::max)
+    };
+    let kml = write(&plan, "kml", &[]).expect("a plan");
+    let read = roxmltree::Document::parse(&kml).expect("well-formed");
+    let wall = read
+        .descendants()
+        .find(|node| node.has_tag_name("LinearRing"));
+    let coordinates = wall.and_then(|wall| wall.last_element_child()?.text());
+    let top = highest(coordinates.expect("a ring"));
+    assert!((798.0..800.0).contains(&top), "{top}");
+    let czml: Value =
+        serde_json::from_str(&write(&plan, "czml", &[]).expect("a plan")).expect("JSON");
+    let threat = czml.as_array().and_then(|packets| packets.last());
+    let threat = threat.expect("packets");
+    let height = threat["position"]["cartographicDegrees"][2].as_f64();
+    let length = threat["cylinder"]["length"].as_f64();
+    let top = height.expect("a number") + 0.5 * length.expect("a number");
+    let place = LatLon {
+        lat: 47.408,
+        lon: 8.547,
+    };
+    let top = top - undulation_m(place);
+    assert!((797.5..800.0).contains(&top), "{top}");
+}
+
 #[test]
 fn the_result_itself_is_not_touched() {
     let plan = plan(&scenario(), &AROUND);

@@ -43,7 +43,7 @@ impl TerminalZones {
         let band = scenario.altitude;
         let steepest = scenario.vehicle.steepest();
         let zone = |point: Point3| {
-            let height = point.z - scenario.terrain.elevation(point.xy());
+            let height = scenario.terrain.height_of(point);
             TerminalZone {
                 center: point.xy(),
                 radius: 2.0 * (band.min - height).max(height - band.max).max(0.0) / steepest,

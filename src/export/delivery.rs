@@ -83,7 +83,7 @@ impl Delivery {
 
     /// Height of `point` above the ground, metres.
     pub(super) fn agl(&self, point: Point3) -> f64 {
-        point.z - self.scenario.terrain.elevation(point.xy())
+        self.scenario.terrain.height_of(point)
     }
 
     /// Progress along `points`, one entry per point.

@@ -99,7 +99,7 @@ fn kicked(model: &Model, route: &[Point3], [many, which, far, side]: [f64; 4]) -
     let mut route = route.to_vec();
     for (idx, waypoint) in route[first..first + count].iter_mut().enumerate() {
         let off_middle = (2.0 * (idx as f64 + 0.5) / count as f64 - 1.0).abs();
-        let above = waypoint.z - scenario.terrain.elevation(waypoint.xy());
+        let above = scenario.terrain.height_of(*waypoint);
         let at = waypoint.xy() + aside * (1.0 - 0.5 * off_middle);
         let at = scenario.area.nearest(at);
         *waypoint = at

@@ -23,7 +23,7 @@ pub(super) struct Moves<'s> {
 impl<'s> Moves<'s> {
     pub(super) fn new(model: &Model<'s>) -> Self {
         let scenario = model.scenario;
-        let coded = |end: Point3| [end.x, end.y, end.z - scenario.terrain.elevation(end.xy())];
+        let coded = |end: Point3| [end.x, end.y, scenario.terrain.height_of(end)];
         Self {
             model: model.clone(),
             way: scenario.direct(),

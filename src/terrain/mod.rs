@@ -19,7 +19,7 @@ pub use peaks::{Peak, Peaks};
 
 use std::sync::Arc;
 
-use crate::geometry::{Point2, Rect, Segment};
+use crate::geometry::{Point2, Point3, Rect, Segment};
 
 /// The ground of a scenario.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,6 +86,12 @@ impl Terrain {
             Self::Grid(grid) => grid.elevation(point),
             Self::Dem(dem) => dem.elevation(point),
         }
+    }
+
+    /// Height of `point` above the ground, metres.
+    #[must_use]
+    pub fn height_of(&self, point: Point3) -> f64 {
+        point.z - self.elevation(point.xy())
     }
 
     /// Least and greatest height above ground over the part `window` of `leg`: exact on flat ground and grids, to a

@@ -252,7 +252,7 @@ impl Pricer<'_> {
         if self.verdict {
             for share in GLANCES {
                 let point = leg.at(window.0 + share * (window.1 - window.0));
-                let height = point.z - self.model.scenario.terrain.elevation(point.xy());
+                let height = self.model.scenario.terrain.height_of(point);
                 if section.floor - height > SURELY || height - section.ceiling > SURELY {
                     let below = (section.floor - height).max(0.0);
                     return (below, (height - section.ceiling).max(0.0));

@@ -45,7 +45,7 @@ impl<'s> Course<'s> {
         Self {
             scenario,
             towards_target: libm::atan2(way.y, way.x),
-            start_height: scenario.start.z - scenario.terrain.elevation(scenario.start.xy()),
+            start_height: scenario.terrain.height_of(scenario.start),
             bounds: Bounds {
                 lower: [0.0, -SECTOR, -SECTOR].repeat(legs),
                 upper: [amplitude, SECTOR, SECTOR].repeat(legs),

@@ -164,7 +164,7 @@ mod tests {
                     }
                 }
                 for point in &route[1..=waypoints] {
-                    let height = point.z - scenario.terrain.elevation(point.xy());
+                    let height = scenario.terrain.height_of(*point);
                     prop_assert!((-1e-9..=200.0 + 1e-9).contains(&height), "{}", name);
                 }
             }

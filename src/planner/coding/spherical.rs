@@ -56,7 +56,7 @@ impl<'s> Spherical<'s> {
             course,
             toward: [libm::cos(course), libm::sin(course)],
             distance,
-            start_height: scenario.start.z - scenario.terrain.elevation(scenario.start.xy()),
+            start_height: scenario.terrain.height_of(scenario.start),
             steepest: scenario.vehicle.steepest(),
             bounds: Bounds {
                 lower: lower.repeat(legs),
@@ -162,7 +162,7 @@ mod tests {
                 prop_assert!(short || turn.abs().to_degrees() <= scenario.vehicle.max_turn_deg + 1e-6);
             }
             for point in &route[1..11] {
-                let height = point.z - scenario.terrain.elevation(point.xy());
+                let height = scenario.terrain.height_of(*point);
                 prop_assert!((-1e-9..=200.0 + 1e-9).contains(&height));
             }
         }

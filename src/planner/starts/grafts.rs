@@ -29,7 +29,7 @@ pub(super) fn are_wanted(model: &Model, is_rough: bool) -> bool {
     let scenario = model.scenario;
     let band = scenario.altitude;
     let is_costly = |end: Point3| {
-        let height = end.z - scenario.terrain.elevation(end.xy());
+        let height = scenario.terrain.height_of(end);
         let mut threats = scenario.threats.iter();
         !(band.min..=band.max).contains(&height)
             || threats.any(|threat| threat.intensity(end) > 0.0)

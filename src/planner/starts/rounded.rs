@@ -28,7 +28,7 @@ pub(super) fn rounded(scenario: &Scenario, chain: &[Point3]) -> Option<Vec<Point
         if count > scenario.planner.waypoints as f64 {
             return None;
         }
-        let height = corner[1].z - scenario.terrain.elevation(corner[1].xy());
+        let height = scenario.terrain.height_of(corner[1]);
         let heading = libm::atan2(before.y, before.x);
         let mut at = corner[1].xy();
         let mut turned = 1.0;

@@ -78,8 +78,7 @@ impl Heights {
             Terrain::Peaks(_) | Terrain::Grid(_) | Terrain::Dem(_) => None,
         };
         let band = scenario.altitude;
-        let ends = [scenario.start, scenario.target]
-            .map(|end| end.z - scenario.terrain.elevation(end.xy()));
+        let ends = [scenario.start, scenario.target].map(|end| scenario.terrain.height_of(end));
         // Outside the terminal zones, a route keeps to the band; there are none where both ends do.
         let within = ends.iter().all(|h| (band.min..=band.max).contains(h));
         let lowest = ends.iter().fold(band.min, |low, h| low.min(*h));

@@ -85,7 +85,7 @@ fn corners_of(scenario: &Scenario, path: &[Point3], shape: Shape) -> Vec<Corner>
 
 fn agl(scenario: &Scenario, point: Point3, shape: Shape) -> f64 {
     if shape.follows_ground {
-        point.z - scenario.terrain.elevation(point.xy())
+        scenario.terrain.height_of(point)
     } else {
         0.0
     }

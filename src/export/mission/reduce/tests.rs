@@ -101,7 +101,7 @@ proptest! {
             if follows_ground {
                 let flat = |points: &[Point3]| -> Vec<Point3> {
                     points.iter().map(|point| {
-                        let z = point.z - scenario.terrain.elevation(point.xy());
+                        let z = scenario.terrain.height_of(*point);
                         Point3::new(point.x, point.y, z)
                     }).collect()
                 };

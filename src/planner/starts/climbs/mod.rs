@@ -84,8 +84,7 @@ fn ways(model: &Model, share: f64) -> Found {
 impl Climb {
     fn by(scenario: &Scenario, share: f64) -> Self {
         let middle = scenario.altitude.middle();
-        let own = [scenario.start, scenario.target]
-            .map(|end| end.z - scenario.terrain.elevation(end.xy()));
+        let own = [scenario.start, scenario.target].map(|end| scenario.terrain.height_of(end));
         let nearer = own
             .into_iter()
             .min_by(|one, other| (one - middle).abs().total_cmp(&(other - middle).abs()))

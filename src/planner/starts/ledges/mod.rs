@@ -109,7 +109,7 @@ mod tests {
                     );
                 }
                 for place in &way[1..way.len() - 1] {
-                    let height = place.z - scenario.terrain.elevation(place.xy());
+                    let height = scenario.terrain.height_of(*place);
                     let (floor, ceiling) = model.heights_over(place.xy());
                     assert!((floor - 1e-6..=ceiling + 1e-6).contains(&height), "{place}");
                 }

@@ -31,7 +31,7 @@ impl Ramp {
     /// the ground may fall away by as much as the band is high.
     pub(super) fn round(scenario: &Scenario, middle: &Middle) -> [Option<Self>; 2] {
         let ends = [scenario.start, scenario.target];
-        let heights = ends.map(|end| end.z - scenario.terrain.elevation(end.xy()));
+        let heights = ends.map(|end| scenario.terrain.height_of(end));
         let outside = heights.map(|height| beyond(scenario.altitude, height));
         // A hair wider than the real zones.
         let allowed = scenario.vehicle.steepest();

@@ -1,10 +1,12 @@
 //! Removes waypoints from a route, one after the other, so that what is left keeps every limit.
 
+use std::ops::Range;
+
 use super::finish::{polish, refine};
 use super::log::Log;
 use super::newton::Newton;
 use super::polish::Steps;
-use super::price::price;
+use super::price::{change, price};
 use super::search::COARSE_STEPS;
 use super::{StopReason, same, why_stop};
 use crate::cost::Model;
@@ -115,11 +117,11 @@ fn fewer(
         let mut lessened = Vec::new();
         for (_, route) in &routes {
             let last = route.len() - 1;
-            let rests = (1..last).map(|idx| without(route, idx));
-            lessened.extend(best_few(model, rests, log));
+            let omissions = (1..last).map(Loss::of).collect();
+            lessened.extend(best_few(model, route, omissions, log));
             if choice.merges {
-                let merges = (1..last - 1).flat_map(|idx| merged(route, idx));
-                lessened.extend(best_few(model, merges, log));
+                let merges = (1..last - 1).flat_map(|idx| Loss::merging(route, idx));
+                lessened.extend(best_few(model, route, merges.collect(), log));
             }
         }
         let is_last = routes[0].1.len() - 3 == waypoints;
@@ -129,17 +131,20 @@ fn fewer(
     Ok(routes)
 }
 
-/// The best few of these `routes`.
-fn best_few(
-    model: &Model,
-    routes: impl Iterator<Item = Vec<Point3>>,
-    log: &mut Log,
-) -> Vec<Vec<Point3>> {
-    let mut priced: Vec<Priced> = routes.map(|route| (price(model, &route), route)).collect();
-    log.evaluations += priced.len() as u64;
+/// What becomes of `route` by the best few of these `losses`.
+fn best_few(model: &Model, route: &[Point3], losses: Vec<Loss>, log: &mut Log) -> Vec<Vec<Point3>> {
+    let legs = losses.len() * Loss::LEGS;
+    log.evaluations += (legs / (route.len() - 1)) as u64;
+    let mut priced: Vec<(Fitness, Loss)> = losses
+        .into_iter()
+        .map(|loss| (loss.change(model, route), loss))
+        .collect();
     priced.sort_by(|one, other| one.0.rank(&other.0));
     priced.truncate(TRIES);
-    priced.into_iter().map(|(_, route)| route).collect()
+    priced
+        .iter()
+        .map(|(_, loss)| loss.of_route(route))
+        .collect()
 }
 
 /// The best of these `routes`, pulled into place; as many as the `choice` keeps.
@@ -187,38 +192,71 @@ fn different(model: &Model, mut routes: Vec<Priced>) -> Vec<Priced> {
     known
 }
 
-/// `route` without waypoint `idx`.
-fn without(route: &[Point3], idx: usize) -> Vec<Point3> {
-    let mut rest = route.to_vec();
-    rest.remove(idx);
-    rest
+/// One waypoint less.
+struct Loss {
+    /// The waypoint left out, or the two that become one.
+    of: Range<usize>,
+    /// This one.
+    instead: Option<Point3>,
 }
 
-/// `route` with waypoint `idx` and the next one made one: halfway between them, and where the legs before and after
-/// would meet.
-fn merged(route: &[Point3], idx: usize) -> Vec<Vec<Point3>> {
-    let [before, one, other, after] = [idx - 1, idx, idx + 1, idx + 2].map(|idx| route[idx]);
-    let (to, back) = (one - before, other - after);
-    let across = to.xy().perp(&back.xy());
-    let between = (other - one).xy();
-    // How much longer the legs become.
-    let (further, earlier) = (
-        between.perp(&back.xy()) / across,
-        between.perp(&to.xy()) / across,
-    );
-    let meets = [further, earlier]
-        .iter()
-        .all(|share| (0.0..MOST_LONGER).contains(share));
-    let corner = meets.then(|| nalgebra::center(&(one + to * further), &(other + back * earlier)));
-    let at = |place: Point3| {
-        let mut merged = without(route, idx);
-        merged[idx] = place;
-        merged
-    };
-    std::iter::once(nalgebra::center(&one, &other))
-        .chain(corner)
-        .map(at)
-        .collect()
+impl Loss {
+    /// Waypoints before and after on which the change in price depends: their turns, and where these come from.
+    const SEEN: usize = 2;
+
+    /// About so many legs are priced for a change.
+    const LEGS: usize = 2 * Self::SEEN + 3;
+
+    fn of(idx: usize) -> Self {
+        Self {
+            of: idx..idx + 1,
+            instead: None,
+        }
+    }
+
+    /// Waypoint `idx` and the next one made one: halfway between them, and where the legs before and after would meet.
+    fn merging(route: &[Point3], idx: usize) -> Vec<Self> {
+        let [before, one, other, after] = [idx - 1, idx, idx + 1, idx + 2].map(|idx| route[idx]);
+        let (to, back) = (one - before, other - after);
+        let across = to.xy().perp(&back.xy());
+        let between = (other - one).xy();
+        // How much longer the legs become.
+        let (further, earlier) = (
+            between.perp(&back.xy()) / across,
+            between.perp(&to.xy()) / across,
+        );
+        let meets = [further, earlier]
+            .iter()
+            .all(|share| (0.0..MOST_LONGER).contains(share));
+        let corner =
+            meets.then(|| nalgebra::center(&(one + to * further), &(other + back * earlier)));
+        let at = |place| Self {
+            of: idx..idx + 2,
+            instead: Some(place),
+        };
+        std::iter::once(nalgebra::center(&one, &other))
+            .chain(corner)
+            .map(at)
+            .collect()
+    }
+
+    /// The part of `route` within `part` after it.
+    fn within(&self, route: &[Point3], part: &Range<usize>) -> Vec<Point3> {
+        let before = route[part.start..self.of.start].iter();
+        let after = route[self.of.end..part.end].iter();
+        before.chain(&self.instead).chain(after).copied().collect()
+    }
+
+    fn of_route(&self, route: &[Point3]) -> Vec<Point3> {
+        self.within(route, &(0..route.len()))
+    }
+
+    fn change(&self, model: &Model, route: &[Point3]) -> Fitness {
+        let first = self.of.start.saturating_sub(Self::SEEN);
+        let part = first..(self.of.end + Self::SEEN).min(route.len());
+        let new = self.within(route, &part);
+        change(model, &route[part], &new)
+    }
 }
 
 #[cfg(test)]
@@ -316,10 +354,37 @@ mod tests {
         let route = [[0.0, 0.0], [80.0, 0.0], [100.0, 20.0], [100.0, 100.0]];
         let route = route.map(|[x, y]| Point3::new(x, y, 50.0));
         let corner = |x, y| vec![route[0], Point3::new(x, y, 50.0), route[3]];
-        assert_eq!(merged(&route, 1), [corner(90.0, 10.0), corner(100.0, 0.0)]);
+        let merges = Loss::merging(&route, 1);
+        let merged: Vec<_> = merges.iter().map(|loss| loss.of_route(&route)).collect();
+        assert_eq!(merged, [corner(90.0, 10.0), corner(100.0, 0.0)]);
         // Legs that lead away from each other meet nowhere ahead.
         let mut away = route;
         away.swap(1, 2);
-        assert_eq!(merged(&away, 1).len(), 1);
+        assert_eq!(Loss::merging(&away, 1).len(), 1);
+    }
+
+    /// What is seen of it says all of the price, turns included.
+    #[test]
+    fn what_a_loss_changes_is_told_from_the_waypoints_beside_it() {
+        let mut scenario = slalom();
+        scenario.vehicle.max_turn_deg = 20.0;
+        let model = Model::new(&scenario);
+        let free = [
+            [150.0, 860.0, 90.0],
+            [290.0, 700.0, 120.0],
+            [320.0, 500.0, 100.0],
+            [500.0, 740.0, 60.0],
+            [700.0, 560.0, 100.0],
+        ]
+        .map(Point3::from);
+        let route = [&[scenario.start], &free[..], &[scenario.target]].concat();
+        let whole = price(&model, &route);
+        let merges = (1..5).flat_map(|idx| Loss::merging(&route, idx));
+        for loss in (1..6).map(Loss::of).chain(merges) {
+            let change = loss.change(&model, &route);
+            let after = price(&model, &loss.of_route(&route));
+            assert!((after.cost - whole.cost - change.cost).abs() < 1e-9);
+            assert!((after.violation - whole.violation - change.violation).abs() < 1e-9);
+        }
     }
 }

@@ -32,3 +32,13 @@ pub(super) fn price(model: &Model, route: &[Point3]) -> Fitness {
         cost: figures.total,
     }
 }
+
+/// The change in fitness when the part `new` of a route is flown in place of the part `old`. Turns count that have both
+/// their legs in the part: where these lead to and from what changes, none is missed.
+pub(super) fn change(model: &Model, old: &[Point3], new: &[Point3]) -> Fitness {
+    let (old, new) = (price(model, old), price(model, new));
+    Fitness {
+        violation: new.violation - old.violation,
+        cost: new.cost - old.cost,
+    }
+}

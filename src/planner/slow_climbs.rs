@@ -6,7 +6,7 @@ use super::doubt::is_hard_pressed;
 use super::fewer::leave_out_quickly;
 use super::finish::finish_from;
 use super::log::Log;
-use super::{MOST_WAYPOINTS, Nobody, StopReason, is_from_scratch, starts, why_stop};
+use super::{MOST_WAYPOINTS, Nobody, StopReason, is_from_scratch, same, starts, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
 
@@ -16,6 +16,10 @@ const TIMES: [usize; 2] = [2, 4];
 /// A way this many times as expensive as the best route is not worth a look: pulling it into place makes it cheaper by that
 /// much at most.
 const PROMISING: f64 = 1.25;
+
+/// A route whose way alone costs this share more than the best route is not worth leaving waypoints out: what they gain by
+/// the last polish is less.
+const HOPE: f64 = 0.03;
 
 /// Whether the best route of `log` is worth it, given that none costs less than `lower`: there is none, or it flies at the
 /// limits of the vehicle, and another may be much cheaper.
@@ -40,31 +44,52 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     };
     let ledges = starts::ledges(model, most, &is_over);
     log.evaluations += ledges.legs_priced / (waypoints as u64 + 1);
-    for way in &ledges.ways {
-        let mut routes = TIMES
-            .map(|times| starts::thinned_out(way, times * waypoints))
-            .to_vec();
-        // Where a way has few places, all of them are kept either way.
-        routes.dedup();
-        for route in routes {
-            if let Some(reason) = why_stop(model.scenario, log.stop) {
-                return reason;
-            }
-            let Some(route) = pulled_into_place(model, route, log) else {
-                continue;
-            };
-            match leave_out_quickly(model, route, log) {
-                Ok(route) => {
-                    finish_from(model, starts::with_waypoints(model, route, waypoints), log);
-                }
-                Err(reason) => return reason,
-            }
-            if log.has_converged() {
-                return StopReason::Converged;
-            }
+    let mut placed: Vec<Vec<Point3>> = Vec::new();
+    for route in followed(&ledges.ways, waypoints) {
+        if let Some(reason) = why_stop(model.scenario, log.stop) {
+            return reason;
+        }
+        let Some(route) = pulled_into_place(model, route, log) else {
+            continue;
+        };
+        let is_known = placed
+            .iter()
+            .any(|other| same(model.scenario, other, &route));
+        if is_known || is_hopeless(model, &route, log) {
+            continue;
+        }
+        placed.push(route.clone());
+        match leave_out_quickly(model, route, log) {
+            Ok(route) => finish_from(model, starts::with_waypoints(model, route, waypoints), log),
+            Err(reason) => return reason,
+        }
+        if log.has_converged() {
+            return StopReason::Converged;
         }
     }
     StopReason::Iterations
+}
+
+/// Different routes along the `ways`: with more or less room a way may be the same, and where it has few places, all of
+/// them are kept whatever the number.
+fn followed(ways: &[Vec<Point3>], waypoints: usize) -> Vec<Vec<Point3>> {
+    let mut routes = Vec::new();
+    for way in ways {
+        for times in TIMES {
+            let route = starts::thinned_out(way, times * waypoints);
+            if !routes.contains(&route) {
+                routes.push(route);
+            }
+        }
+    }
+    routes
+}
+
+/// Whether `route` will hardly become better than the best one: with fewer waypoints its way is hardly shorter or less
+/// exposed, only its heights may cost less.
+fn is_hopeless(model: &Model, route: &[Point3], log: &Log) -> bool {
+    let figures = model.figures(route, model.scenario.planner.quadrature);
+    log.best.is_feasible() && figures.fuel + figures.threat > log.best.cost * (1.0 + HOPE)
 }
 
 /// What becomes of `route` with as many waypoints as it has, if that keeps every limit.

@@ -1,12 +1,11 @@
 //! Where spare waypoints of a route go: along its legs, off one of them to the middle of the band, or in a bow up there.
 
 use super::bow::bent;
-use super::surplus::change;
 use super::{lifted, steepest};
 use crate::cost::{Model, metre};
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
-use crate::planner::price::{price, search_tolerance};
+use crate::planner::price::{change, price, search_tolerance};
 
 /// Waypoints are placed no nearer to each other than this share of the way, if the legs allow it.
 const APART: f64 = 1e-4;

@@ -3,7 +3,7 @@
 use crate::cost::Model;
 use crate::geometry::{LEVEL, Point3};
 use crate::optimizer::Fitness;
-use crate::planner::price::price;
+use crate::planner::price::change;
 
 /// Remove the waypoint that is missed least, or replace two by one, until `waypoints` free ones are left.
 pub(super) fn leave_out(model: &Model, route: &mut Vec<Point3>, waypoints: usize) {
@@ -83,15 +83,6 @@ impl Omission {
     }
 }
 
-/// The change in fitness when `new` is flown in place of `old`.
-pub(super) fn change(model: &Model, old: &[Point3], new: &[Point3]) -> Fitness {
-    let (old, new) = (price(model, old), price(model, new));
-    Fitness {
-        violation: new.violation - old.violation,
-        cost: new.cost - old.cost,
-    }
-}
-
 /// Where the leg from `a` to `b`, extended, meets the leg from `c` to `d`, extended backwards.
 fn crossing(a: Point3, b: Point3, c: Point3, d: Point3) -> Option<Point3> {
     let (ahead, back, gap) = (b.xy() - a.xy(), c.xy() - d.xy(), c.xy() - b.xy());
@@ -112,6 +103,7 @@ fn crossing(a: Point3, b: Point3, c: Point3, d: Point3) -> Option<Point3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::planner::price::price;
     use crate::planner::starts::with_waypoints;
     use crate::planner::tests::{route, scenario};
 

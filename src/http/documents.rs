@@ -14,6 +14,7 @@ use crate::export::{
 };
 use crate::job::Plan;
 use crate::scenario::json::Unread;
+use crate::store::StoreError;
 
 /// What is encoded in the second name of a file, RFC 8187.
 const ENCODED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.');
@@ -98,19 +99,23 @@ async fn written(
         (choices[0].0, result)
     } else {
         let result_room = state.answers.room_to_make_one(result.len())?;
-        let scenario = state.store.scenario(plan.id).await?;
-        let scenario_room = state.answers.room_to_make_one(scenario.len())?;
-        let rules = state.rules.clone();
-        let write = move |scenario: &String| {
-            let _rooms = (&result_room, &scenario_room);
-            let input = ResultInput {
-                result: &result,
-                scenario,
-                rules: &rules,
-            };
-            write_first(&choices, &input)
-        };
-        state.terrains.over(caller, scenario, write).await??
+        match state.store.scenario(plan.id).await {
+            Ok(scenario) => {
+                let scenario_room = state.answers.room_to_make_one(scenario.len())?;
+                let rules = state.rules.clone();
+                let write = move |scenario: &String| {
+                    let _rooms = (&result_room, &scenario_room);
+                    let input = ResultInput {
+                        result: &result,
+                        scenario,
+                        rules: &rules,
+                    };
+                    write_first(&choices, &input)
+                };
+                state.terrains.over(caller, scenario, write).await??
+            }
+            Err(error) => (without_scenario(&choices, error)?, result),
+        }
     };
     let kind = if format.shown { "inline" } else { "attachment" };
     let ending = format!(".{}", format.extension);
@@ -149,6 +154,15 @@ fn write_first(
         }
     }
     Err(refusal.expect("there is at least one choice"))
+}
+
+/// The format that needs no scenario, if the caller accepts it and `error` is that the scenario is lost.
+fn without_scenario(choices: &[Choice], error: StoreError) -> Result<&'static Format, StoreError> {
+    let mut formats = choices.iter().map(|(format, _)| *format);
+    match (error, formats.find(|format| format.is_stored())) {
+        (StoreError::ScenarioLost(_), Some(format)) => Ok(format),
+        (error, _) => Err(error),
+    }
 }
 
 /// How a browser should handle a document of `plan`: the `kind` of RFC 6266, and the file's name with this `ending`.

@@ -49,6 +49,9 @@ pub enum StoreError {
     /// The plan ended, was deleted or was claimed by another worker.
     #[error("plan {0} is no longer this worker's to run")]
     LeaseLost(PlanId),
+    /// The scenario that was accepted is not in the store, though its plan is.
+    #[error("plan {0} has lost its scenario")]
+    ScenarioLost(PlanId),
     /// Another process uses the data directory.
     #[error("data directory {0} is in use by another process")]
     InUse(std::path::PathBuf),

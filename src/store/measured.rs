@@ -37,7 +37,7 @@ impl MeasuredStore {
         self.counted(operation, done)
     }
 
-    /// A caller's mistake is not a failure of the store.
+    /// A caller's mistake is not a failure of the store, and neither is what a single plan has lost.
     fn counted<T>(
         &self,
         operation: &'static str,

@@ -157,7 +157,7 @@ pub trait Store: Send + Sync + 'static {
     /// The accepted scenario document.
     ///
     /// # Errors
-    /// As [`Store::get`].
+    /// As [`Store::get`], and [`StoreError::ScenarioLost`].
     async fn scenario(&self, id: PlanId) -> Result<String, StoreError>;
 
     /// The result document, byte for byte as it was finished; `None` while there is none.

@@ -8,8 +8,8 @@ use crate::support::lives::{a_plan, a_run_of, await_run, running};
 use crate::support::openmetrics::Reading;
 use crate::support::patience::eventually;
 use crate::support::process::Service;
-use crate::support::scenario;
 use crate::support::stores::{Place, for_every_backend};
+use crate::support::{run, scenario};
 
 async fn read(api: &Api) -> Reading {
     let answer = api.get("/metrics").await;
@@ -64,6 +64,41 @@ async fn failures_of_each_route_are_counted_from_zero() {
         let failures = reading.value(&format!("noctule_http_requests_total{labels}"));
         assert!(failures == 0.0, "{labels} is {failures}");
     }
+}
+
+/// The store is sound, and so are the other plans: nobody is to be called for it, or told to try again.
+#[tokio::test]
+async fn a_lost_scenario_is_its_plan_s_alone() {
+    let api = Api::new();
+    let [lost, sound] = [api.submit().await, api.submit().await];
+    for _ in 0..2 {
+        run::complete(&*api.store, vec![run::convergence(0, 0.1)]).await;
+    }
+    let file = api.data_dir().join("noctule.db");
+    let database = rusqlite::Connection::open(file).expect("the store's file");
+    for damage in [
+        "UPDATE scenarios SET document = CAST(x'ff' AS TEXT) WHERE plan_seq = 1",
+        "DELETE FROM scenarios WHERE plan_seq = 1",
+    ] {
+        assert_eq!(database.execute(damage, []).expect(damage), 1);
+        for path in ["/scenario", "/result?format=svg", "/result?format=kml"] {
+            let answer = api.get(&format!("{lost}{path}")).await;
+            let problem = answer.expect_problem(409, "scenario-lost");
+            let detail = problem["detail"].as_str().expect("a text");
+            assert!(detail.contains("no longer in the store"), "{detail}");
+            assert!(!answer.headers.contains_key("retry-after"), "{path}");
+        }
+    }
+    let stored = api.get(&format!("{lost}/result")).await;
+    assert_eq!(stored.status, 200);
+    let accept = [("accept", "image/svg+xml, application/json;q=0.5")];
+    let accepted = api.get_with(&format!("{lost}/result"), &accept).await;
+    assert_eq!(accepted.body, stored.body);
+    assert_eq!(api.get(&format!("{sound}/scenario")).await.status, 200);
+    assert_eq!(api.get("/readyz").await.status, 200);
+    let failures = "noctule_store_operation_failures_total{operation=\"scenario\"}";
+    let counted = read(&api).await.series.get(failures).copied();
+    assert!(counted.unwrap_or(0.0) < 0.5, "{counted:?}");
 }
 
 /// Callers cannot add series, whatever they send.

@@ -146,6 +146,9 @@ impl Problem {
             } => {
                 format!("plan {id} was {} before it had a route", status.name())
             }
+            Self::ScenarioLost(id) => {
+                format!("the scenario of plan {id} is no longer in the store, and formats that need it cannot be written; a result is still available as json, and other plans are not affected")
+            }
             Self::Gone(Tombstone { id, expired, .. }) if *expired => {
                 format!("plan {id} was kept as long as the service keeps plans, and removed")
             }

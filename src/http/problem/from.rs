@@ -31,6 +31,10 @@ impl From<StoreError> for Problem {
                 queued,
                 retry_after_s: 1,
             },
+            StoreError::ScenarioLost(id) => {
+                tracing::error!(plan_id = %id, "the store has lost the scenario of a plan");
+                Self::ScenarioLost(id)
+            }
             error @ (StoreError::Unavailable { .. } | StoreError::InUse(_)) => {
                 tracing::error!(%error, "the store did not answer");
                 Self::store_unavailable(&error)

@@ -20,13 +20,19 @@ const INVALID_SCENARIO: Kind = (
     "The scenario cannot be planned",
 );
 
+const SCENARIO_LOST: Kind = (
+    StatusCode::CONFLICT,
+    "scenario-lost",
+    "The plan's scenario is lost",
+);
+
 /// Status and title for the reason of a plan's failure; the same as for a request refused for that reason.
 pub(super) fn of_failure(name: &str) -> (StatusCode, &'static str) {
     let (status, _, title) = match FailureKind::named(name) {
         Some(FailureKind::NoGround) => NO_GROUND,
         Some(FailureKind::InvalidScenario) => INVALID_SCENARIO,
-        Some(FailureKind::PlannerPanic | FailureKind::WorkerLost | FailureKind::ScenarioLost)
-        | None => {
+        Some(FailureKind::ScenarioLost) => SCENARIO_LOST,
+        Some(FailureKind::PlannerPanic | FailureKind::WorkerLost) | None => {
             return (StatusCode::INTERNAL_SERVER_ERROR, "The plan failed");
         }
     };
@@ -136,6 +142,7 @@ impl Problem {
                 "The dataset is the operator's",
             ),
             Self::NoGround(_) => NO_GROUND,
+            Self::ScenarioLost(_) => SCENARIO_LOST,
             Self::PreconditionFailed(_) => (
                 StatusCode::PRECONDITION_FAILED,
                 "precondition-failed",

@@ -55,6 +55,8 @@ pub(super) enum Problem {
     TerrainMounted(String),
     /// The dataset that a plan was made over no longer exists; why.
     NoGround(String),
+    /// The store no longer has the scenario of this plan.
+    ScenarioLost(PlanId),
     /// A plan or a dataset is not what the request expects; which.
     PreconditionFailed(String),
     /// A dataset is too long; the limit in bytes.

@@ -51,13 +51,17 @@ impl JetStream {
     pub(super) async fn scenario(&self, id: PlanId) -> Result<String, StoreError> {
         let standing = self.plans().standing(id).await?;
         let record = standing.record(id, self.expiry_ms())?;
-        self.read_document(id, &record.scenario).await
+        let scenario = self.read_document(id, &record.scenario).await?;
+        scenario.ok_or(StoreError::ScenarioLost(id))
     }
 
     pub(super) async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
         let standing = self.present(id).await?;
         match &standing.record(id, self.expiry_ms())?.result {
-            Some(result) => self.read_document(id, result).await.map(Some),
+            Some(result) => match self.read_document(id, result).await? {
+                Some(text) => Ok(Some(text)),
+                None => Err(result.missing()),
+            },
             None => Ok(None),
         }
     }
@@ -153,14 +157,18 @@ impl JetStream {
         self.asking.states.ask(id, renewed).await
     }
 
-    /// A document that a plan's record names.
-    async fn read_document(&self, id: PlanId, document: &Document) -> Result<String, StoreError> {
+    /// A document that a plan's record names; `None` when the servers have lost it, but not the plan.
+    async fn read_document(
+        &self,
+        id: PlanId,
+        document: &Document,
+    ) -> Result<Option<String>, StoreError> {
         if let Some(text) = self.servers.read(document).await? {
-            return Ok(text);
+            return Ok(Some(text));
         }
         // It goes with its plan, which may have been removed meanwhile.
         let standing = self.plans().look_up(id).await?;
         standing.record(id, self.expiry_ms())?;
-        Err(document.missing())
+        Ok(None)
     }
 }

@@ -4,6 +4,7 @@ use std::error::Error;
 use std::sync::Arc;
 
 use parking_lot::Mutex;
+use rusqlite::Error::QueryReturnedNoRows;
 use rusqlite::types::{Value, ValueRef};
 use rusqlite::{Connection, OpenFlags, OptionalExtension, params_from_iter};
 use tokio::sync::Semaphore;
@@ -12,7 +13,7 @@ use super::BUSY_TIMEOUT;
 use super::opening::Place;
 use super::packed;
 use super::row::{COLUMNS, PlanRow};
-use super::unreadable::{Passed, Unreadable};
+use super::unreadable::{Passed, Unreadable, is_the_row_s};
 use crate::export::document::Incumbent;
 use crate::job::{Event, NumberedEvent, Plan, PlanId, Status};
 use crate::store::{
@@ -101,8 +102,14 @@ pub(super) fn scenario(
     expiry_ms: i64,
 ) -> Result<String, StoreError> {
     let sql = "SELECT document FROM plans LEFT JOIN scenarios ON plan_seq = seq WHERE id = ?1";
-    let document = document(connection, sql, id, expiry_ms)?;
-    document.ok_or_else(|| StoreError::unavailable(format!("plan {id} has lost its scenario")))
+    match found(connection, sql, id) {
+        Ok(Some(document)) => Ok(document),
+        Ok(None) => Err(StoreError::ScenarioLost(id)),
+        Err(QueryReturnedNoRows) => Err(missing(connection, id, expiry_ms)?),
+        // What is no text is not what was written.
+        Err(error) if is_the_row_s(&error) => Err(StoreError::ScenarioLost(id)),
+        Err(error) => Err(error.into()),
+    }
 }
 
 pub(super) fn result(
@@ -133,14 +140,18 @@ fn document(
     id: PlanId,
     expiry_ms: i64,
 ) -> Result<Option<String>, StoreError> {
-    let document: Option<Option<String>> = connection
+    match found(connection, sql, id) {
+        Ok(document) => Ok(document),
+        Err(QueryReturnedNoRows) => Err(missing(connection, id, expiry_ms)?),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// A document of a plan, or [`QueryReturnedNoRows`] when there is no such plan.
+fn found(connection: &Connection, sql: &str, id: PlanId) -> rusqlite::Result<Option<String>> {
+    connection
         .prepare_cached(sql)?
         .query_row([id.to_string()], |row| row.get(0))
-        .optional()?;
-    match document {
-        Some(document) => Ok(document),
-        None => Err(missing(connection, id, expiry_ms)?),
-    }
 }
 
 /// Plans whose record cannot be read are left out, and others take their place on the page.

@@ -1,6 +1,6 @@
 //! The service without a socket, over a store of its own. Every response is checked against `openapi.yaml`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -149,6 +149,11 @@ impl Api {
     /// The directory of uploads.
     pub(crate) fn uploads(&self) -> PathBuf {
         self.uploads.clone()
+    }
+
+    /// The directory of the store.
+    pub(crate) fn data_dir(&self) -> &Path {
+        self.place.path()
     }
 
     fn made(options: Options, access: Access, origins: &[&str]) -> Self {

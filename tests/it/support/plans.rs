@@ -128,6 +128,7 @@ pub(crate) fn kind<T>(result: Result<T, StoreError>) -> Result<(), &'static str>
         StoreError::KeyReused => "key reused",
         StoreError::KeyInFlight => "key in flight",
         StoreError::LeaseLost(_) => "lease lost",
+        StoreError::ScenarioLost(_) => "scenario lost",
         StoreError::InUse(_) => "in use",
         StoreError::Unavailable { .. } => "unavailable",
     })

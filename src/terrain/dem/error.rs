@@ -52,7 +52,7 @@ pub enum DemError {
     },
     /// Neither the file nor the caller states the coordinate reference system.
     #[error(
-        "the file names no coordinate reference system; state `crs`, such as EPSG:32616, or EPSG:4326 for degrees"
+        "the file names no coordinate reference system, such as EPSG:32616, or EPSG:4326 for degrees; state it as `crs` (?crs=EPSG:32616 of an upload), or write a file that names it: gdal_translate -a_srs EPSG:32616 in.asc out.tif"
     )]
     NoCrs,
     /// A reference system that cannot be used.

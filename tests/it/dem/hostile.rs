@@ -105,7 +105,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("rotated.tif", right().with(tiff::TRANSFORMATION, Double(vec![0.01, 0.002, 0.0, 8.0, 0.002, -0.01, 0.0, 45.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])).bytes(), "rotated"),
         ("beyond.tif", right().with(tiff::TIE_POINT, Double(vec![0.0, 0.0, 0.0, 8.0, 95.0, 0.0])).bytes(), "which EPSG:4326 does not"),
         ("round.tif", right().with(tiff::SCALE, Double(vec![200.0, 0.01, 0.0])).bytes(), "which EPSG:4326 does not"),
-        ("no-crs.tif", right().without(tiff::KEYS).bytes(), "names no coordinate reference system; state `crs`, such as EPSG:32616, or EPSG:4326 for degrees"),
+        ("no-crs.tif", right().without(tiff::KEYS).bytes(), "gdal_translate -a_srs EPSG:32616 in.asc out.tif"),
         ("own-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 32_767)).bytes(), "without an EPSG code"),
         ("unknown-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 9)).bytes(), "EPSG:9 cannot be used"),
         ("shifted-crs.tif", right().with(tiff::KEYS, tiff::keys(2, 2048, 4267)).bytes(), "EPSG:4267 cannot be used"),

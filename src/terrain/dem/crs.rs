@@ -7,6 +7,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use proj4rs::Proj;
+use proj4rs::errors::Error;
 
 use super::{DemError, heights, shifts};
 use crate::geometry::geodesy::LatLon;
@@ -16,6 +17,9 @@ const WGS84: &str = "+proj=longlat +datum=WGS84 +no_defs";
 
 /// Why a code that nobody has heard of cannot be used.
 const UNKNOWN: &str = "its definition is not known";
+
+/// What helps where the library cannot use a definition.
+const REWRITE: &str = "rewrite the file in another one, such as by gdalwarp -t_srs EPSG:4326";
 
 /// A coordinate reference system.
 #[derive(Clone)]
@@ -114,8 +118,17 @@ impl Crs {
         if !(modern || shift("+datum=") || shift("+towgs84=") || says("+nadgrids=@null")) {
             return Err(unusable("its shift to WGS 84 is not known".into()));
         }
-        let proj =
-            |text: &str| Proj::from_proj_string(text).map_err(|error| unusable(error.to_string()));
+        let proj = |text: &str| {
+            Proj::from_proj_string(text).map_err(|error| {
+                let reason = match error {
+                    Error::NadGridNotAvailable => {
+                        "its shift to WGS 84 is in a file that is not read here".to_owned()
+                    }
+                    error => format!("its definition cannot be read here ({error})"),
+                };
+                unusable(format!("{reason}; {REWRITE}"))
+            })
+        };
         let own = proj(&words.join(" "))?;
         if own.is_geocent() {
             return Err(unusable(
@@ -325,7 +338,12 @@ mod tests {
             (4807, "its coordinates are in grads"),
             (4979, "above the ellipsoid"),
             (8713, "in the unit \"us-ft\""),
-            (4267, "NAD grid not available"),
+            (
+                4267,
+                "in a file that is not read here; rewrite the file in another one",
+            ),
+            (26_716, "such as by gdalwarp -t_srs EPSG:4326"),
+            (27_200, "(Projection not found); rewrite the file"),
         ] {
             let error = Crs::epsg(code).expect_err("it is refused").to_string();
             assert!(error.contains(reason), "{error}");

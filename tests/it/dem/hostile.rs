@@ -108,7 +108,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("no-crs.tif", right().without(tiff::KEYS).bytes(), "gdal_translate -a_srs EPSG:32616 in.asc out.tif"),
         ("own-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 32_767)).bytes(), "without an EPSG code"),
         ("unknown-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 9)).bytes(), "EPSG:9 cannot be used"),
-        ("shifted-crs.tif", right().with(tiff::KEYS, tiff::keys(2, 2048, 4267)).bytes(), "EPSG:4267 cannot be used"),
+        ("shifted-crs.tif", right().with(tiff::KEYS, tiff::keys(2, 2048, 4267)).bytes(), "EPSG:4267 cannot be used: its shift to WGS 84 is in a file"),
         ("mixed-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 4326)).bytes(), "which it is not"),
         ("earth-centred.tif", right().with(tiff::KEYS, tiff::keys(3, 2048, 4978)).bytes(), "earth-centred"),
         ("bad-keys.tif", right().with(tiff::KEYS, Short(vec![9, 1, 0, 0])).bytes(), "geo keys"),

@@ -50,21 +50,27 @@ impl File {
             name: self.own_name.as_deref(),
             ..Declared::default()
         };
-        dem::open(&self.path, declared).with_context(|| self.path.display().to_string())
+        dem::open(&self.path, declared).with_context(|| self.name())
+    }
+
+    /// For errors, which tell what is wrong but not where.
+    fn name(&self) -> String {
+        self.path.display().to_string()
     }
 }
 
 pub(super) fn run(command: &Command) -> anyhow::Result<u8> {
     let text = match command {
-        Command::Info { file } => info(&file.open()?)?,
-        Command::Sample { file, points } => sample(&file.open()?, points)?,
+        Command::Info { file } => info(file)?,
+        Command::Sample { file, points } => sample(file, points)?,
     };
     files::print(&text)?;
     Ok(exit::DONE)
 }
 
-fn info(dataset: &Dataset) -> anyhow::Result<String> {
-    let survey = dataset.survey()?;
+fn info(file: &File) -> anyhow::Result<String> {
+    let dataset = file.open()?;
+    let survey = dataset.survey().with_context(|| file.name())?;
     let Metadata {
         format,
         lattice,
@@ -111,7 +117,8 @@ fn name(sample_type: SampleType) -> &'static str {
     }
 }
 
-fn sample(dataset: &Dataset, points: &Path) -> anyhow::Result<String> {
+fn sample(file: &File, points: &Path) -> anyhow::Result<String> {
+    let dataset = file.open()?;
     let text = String::from_utf8(files::read(points)?)
         .with_context(|| format!("cannot read {}", points.display()))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
@@ -128,7 +135,8 @@ fn sample(dataset: &Dataset, points: &Path) -> anyhow::Result<String> {
         })
         .collect::<anyhow::Result<Vec<_>>>()?;
     let mut text = String::new();
-    for elevation in dataset.sample(&places)? {
+    let elevations = dataset.sample(&places).with_context(|| file.name())?;
+    for elevation in elevations {
         match elevation {
             Some(elevation) => writeln!(text, "{elevation}")?,
             None => writeln!(text, "none")?,

@@ -172,6 +172,7 @@ fn wrong_files_are_refused_in_little_memory() {
         let reason = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{name}: {reason}");
         assert!(!reason.contains("panicked"), "{name}: {reason}");
+        assert!(reason.contains(name), "{reason}");
     }
 }
 

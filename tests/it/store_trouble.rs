@@ -158,6 +158,10 @@ async fn a_damaged_file_is_reported_and_its_backup_can_be_restored() {
     assert_eq!(copied.status.code(), Some(0), "{copied:?}");
     let again = run(&["store", "backup", "--data-dir", paths[0], paths[1]], "");
     assert_eq!(again.status.code(), Some(1), "nothing is overwritten");
+    let refusal = String::from_utf8(again.stderr).unwrap();
+    let expected = format!("the copy cannot be written: {} exists", paths[1]);
+    assert!(refusal.contains(&expected), "{refusal}");
+    assert!(!refusal.contains("unavailable"), "{refusal}");
     let checked = run(&["store", "check", "--data-dir", paths[0]], "");
     let expected = format!("1 plans, 0 faults in {}\n", paths[0]);
     assert_eq!(checked.stdout, expected.as_bytes(), "{checked:?}");

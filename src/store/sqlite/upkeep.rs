@@ -1,8 +1,9 @@
 //! Operator's maintenance of the file: check for damage, and back up.
 
 use std::fs::{File, Permissions, TryLockError};
+use std::io;
 use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _, PermissionsExt as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rusqlite::types::{ToSqlOutput, ValueRef};
 use rusqlite::{Connection, OpenFlags};
@@ -119,15 +120,36 @@ fn ends(batch: &str) -> bool {
     events.last().is_some_and(|event| event["event"] == "end")
 }
 
+/// Why no copy was written.
+#[derive(Debug, thiserror::Error)]
+pub enum BackupError {
+    /// The store is not there, or cannot be read.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// There is a file of that name, which may be an earlier copy.
+    #[error("the copy cannot be written: {} exists, must be a new file", .0.display())]
+    Exists(PathBuf),
+    /// The file system's error; not a source, because the message has all of it.
+    #[error("the copy cannot be written: {}: {error}", .to.display())]
+    Unwritable {
+        /// The file to write.
+        to: PathBuf,
+        /// Why not.
+        error: io::Error,
+    },
+}
+
 /// Write a compact copy of the store in `data_dir`, as of one moment, to the new file `to`, whether a service is using
 /// the store or not. The copy is on the disk when this returns.
 ///
 /// # Errors
-/// [`StoreError::Unavailable`] when there is no store, or `to` exists or cannot be written.
-pub fn backup(data_dir: &Path, to: &Path) -> Result<(), StoreError> {
-    let unusable =
-        |error: std::io::Error| StoreError::unavailable(format!("{}: {error}", to.display()));
-    let exists = || StoreError::unavailable(format!("{} exists", to.display()));
+/// [`BackupError::Store`] when there is no store, [`BackupError::Exists`], and [`BackupError::Unwritable`].
+pub fn backup(data_dir: &Path, to: &Path) -> Result<(), BackupError> {
+    let unusable = |error| BackupError::Unwritable {
+        to: to.to_owned(),
+        error,
+    };
+    let exists = || BackupError::Exists(to.to_owned());
     if to.exists() {
         return Err(exists());
     }
@@ -146,7 +168,7 @@ pub fn backup(data_dir: &Path, to: &Path) -> Result<(), StoreError> {
     let path = ToSqlOutput::Borrowed(ValueRef::Text(part.as_os_str().as_encoded_bytes()));
     let written = connection
         .execute("VACUUM INTO ?1", [path])
-        .map_err(StoreError::from)
+        .map_err(|error| BackupError::Store(error.into()))
         .and_then(|_| put_in_place(&part, to).map_err(unusable));
     if written.is_err() {
         let _ = std::fs::remove_file(&part);
@@ -156,8 +178,8 @@ pub fn backup(data_dir: &Path, to: &Path) -> Result<(), StoreError> {
 
 /// An empty file that no other backup is writing at the same time, until this one is dropped. What a backup that was
 /// killed has left is thrown away. Only its owner may read it, as with the store itself.
-fn hold(part: &Path) -> std::io::Result<File> {
-    let another = || std::io::Error::other("another backup is writing it");
+fn hold(part: &Path) -> io::Result<File> {
+    let another = || io::Error::other("another backup is writing it");
     let file = File::options()
         .create(true)
         .truncate(false)
@@ -181,7 +203,7 @@ fn hold(part: &Path) -> std::io::Result<File> {
 }
 
 /// Rename a complete file to its final name; file and name are on the disk when this returns.
-fn put_in_place(part: &Path, to: &Path) -> std::io::Result<()> {
+fn put_in_place(part: &Path, to: &Path) -> io::Result<()> {
     File::open(part)?.sync_all()?;
     durable::put(part, to)
 }

@@ -86,6 +86,9 @@ impl Problem {
             Self::TerrainMounted(name) => {
                 format!("{name} is a file in the directory that the service was started with, which is only read; take another name")
             }
+            Self::TerrainOwned(name) => {
+                format!("{name} was not uploaded by the key's owner; only who uploaded it, and keys with the scope admin, may replace or delete it")
+            }
             Self::TerrainTooLarge(limit) => {
                 format!("the dataset is longer than {limit} bytes, the limit terrain_bytes of GET /limits")
             }

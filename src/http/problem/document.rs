@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::{Problem, kind};
-use crate::http::auth::TooMany;
+use crate::http::auth::{Scope, TooMany};
 use crate::job::Failure;
 use crate::scenario::json::Fault;
 
@@ -41,7 +41,9 @@ impl Problem {
             Self::NoScenario { unused, .. } => json!({"unused": unused}),
             Self::InvalidParameter { name, .. } => json!({"parameter": name}),
             Self::NotAcceptable { available, .. } => json!({"available": available}),
-            Self::Forbidden(scope) => json!({"scope": scope.name()}),
+            Self::Forbidden(_) | Self::TerrainOwned(_) => {
+                json!({"scope": self.scope().map(Scope::name)})
+            }
             Self::TooManyStreams(TooMany { limit, .. }) => json!({"limit": limit}),
             _ => json!({}),
         }

@@ -5,7 +5,6 @@ use std::io::ErrorKind;
 use super::Problem;
 use crate::catalogue::CatalogueError;
 use crate::export::ExportError;
-use crate::http::auth::Scope;
 use crate::http::shown::Shown;
 use crate::import::ImportError;
 use crate::scenario::json::{Refusal, Unread};
@@ -131,7 +130,7 @@ impl From<CatalogueError> for Problem {
             CatalogueError::Exists { .. }
             | CatalogueError::Absent { .. }
             | CatalogueError::Changed { .. } => Self::PreconditionFailed(detail),
-            CatalogueError::Owned { .. } => Self::Forbidden(Scope::Admin),
+            CatalogueError::Owned { name } => Self::TerrainOwned(name),
             CatalogueError::Unreadable(_) => Self::InvalidTerrain(detail),
             CatalogueError::TooLarge { limit } => Self::TerrainTooLarge(limit),
             CatalogueError::Full { room } => Self::TerrainsFull(room),

@@ -85,7 +85,7 @@ impl Problem {
                 "The request is for another host",
             ),
             Self::Unauthorized(_) => (StatusCode::UNAUTHORIZED, "unauthorized", "A key is needed"),
-            Self::Forbidden(_) => (
+            Self::Forbidden(_) | Self::TerrainOwned(_) => (
                 StatusCode::FORBIDDEN,
                 "forbidden",
                 "The key may not do this",

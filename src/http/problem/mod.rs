@@ -53,6 +53,8 @@ pub(super) enum Problem {
     },
     /// The dataset is one of the operator's files.
     TerrainMounted(String),
+    /// The dataset was not uploaded by the caller, who may not change those of others.
+    TerrainOwned(String),
     /// The dataset that a plan was made over no longer exists; why.
     NoGround(String),
     /// The store no longer has the scenario of this plan.
@@ -267,13 +269,21 @@ impl Problem {
             Self::Unauthorized(_) => Some(HeaderValue::from_static(
                 "Bearer realm=\"noctule\", error=\"invalid_token\"",
             )),
-            Self::Forbidden(scope) => {
-                let scope = scope.name();
+            _ => {
+                let scope = self.scope()?.name();
                 let text = format!(
                     "Bearer realm=\"noctule\", error=\"insufficient_scope\", scope=\"{scope}\""
                 );
                 Some(HeaderValue::from_str(&text).expect("names are visible ASCII"))
             }
+        }
+    }
+
+    /// The scope that the caller's key would need.
+    fn scope(&self) -> Option<Scope> {
+        match self {
+            Self::Forbidden(scope) => Some(*scope),
+            Self::TerrainOwned(_) => Some(Scope::Admin),
             _ => None,
         }
     }

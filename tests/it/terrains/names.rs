@@ -314,7 +314,12 @@ async fn every_key_reads_datasets_and_only_uploader_or_admin_changes_them() {
         .expect_problem(401, "unauthorized");
     upload(0, 1.0).await.expect_problem(403, "forbidden");
     assert_eq!(upload(1, 1.0).await.status, 201);
-    upload(2, 2.0).await.expect_problem(403, "forbidden");
+    let refusal = upload(2, 2.0).await.expect_problem(403, "forbidden");
+    assert_eq!(refusal["scope"], "admin");
+    assert_eq!(
+        refusal["detail"],
+        "hill was not uploaded by the key's owner; only who uploaded it, and keys with the scope admin, may replace or delete it"
+    );
     assert_eq!(upload(1, 2.0).await.status, 200);
     assert_eq!(upload(3, 3.0).await.status, 200);
     // The dataset is the operator's now.

@@ -144,9 +144,11 @@ mod tests {
         let page = include_str!("../../../docs/PROBLEMS.md");
         for (field, range) in [
             (
-                "`x`, `y`, `z`, `base`, `top`, `elevation`, `height`, each of `elevations`",
+                "`x`, `y`, `z`, `alt`, `base`, `top`, `elevation`, `height`, each of `elevations`",
                 COORDINATE,
             ),
+            ("`lat`", LATITUDE),
+            ("`lon`", LONGITUDE),
             ("`area`'s corners", AREA),
             ("`radius`, `influence`", RADIUS),
             ("`margin`", MARGIN),

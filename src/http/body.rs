@@ -43,7 +43,7 @@ pub(super) async fn read_a_map(
         Some("text/plain") => Syntax::Lines,
         _ if is_json(headers) => Syntax::Json,
         _ => {
-            let allowed = "application/geo+json, application/vnd.google-earth.kml+xml, text/plain or application/json";
+            let allowed = "application/json, application/geo+json, application/vnd.google-earth.kml+xml, application/xml, text/xml or text/plain";
             return Err(unsupported(headers, allowed));
         }
     };

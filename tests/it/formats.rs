@@ -451,7 +451,17 @@ async fn files_that_are_no_scenario_are_refused() {
         let answer = api
             .send(Method::POST, "/scenarios:convert", &headers, body)
             .await;
-        answer.expect_problem(status, slug);
+        let problem = answer.expect_problem(status, slug);
+        if status == 415 {
+            let detail = problem["detail"].as_str().expect("a text");
+            for read in [
+                "application/geo+json",
+                "application/xml",
+                "text/xml or text/plain",
+            ] {
+                assert!(detail.contains(read), "{detail}");
+            }
+        }
     }
     let long = "x".repeat(5000);
     let headers = [("content-type", "application/json")];

@@ -52,11 +52,33 @@ pub(in super::super) fn convert(
         let at = format!("line {row}");
         match read.next() {
             Some(Ok(airspace)) => add(&mut draft, &at, &airspace, lines),
-            Some(Err(reason)) => draft.leave(at, reason),
+            Some(Err(reason)) => draft.leave(at, unread(reason, row, lines)),
             None => draft.leave(at, "no airspace"),
         }
     }
     draft.finish()
+}
+
+/// Why an airspace with these `lines`, of which the first has the number `row`, is not read. Of a record that the library
+/// does not know, its `reason` has the letters alone, without what stands between them; told is the line as written.
+fn unread(reason: String, row: usize, lines: &str) -> String {
+    let letters = reason.strip_prefix("Parse error (unexpected \"");
+    let letters = letters.and_then(|letters| letters.strip_suffix("\")"));
+    let begins_so = |line: &str| {
+        let written = line.chars().filter(|letter| !letter.is_whitespace());
+        letters.is_some_and(|letters| written.take(2).eq(letters.chars()))
+    };
+    let mut numbered = lines.lines().enumerate();
+    match numbered.find(|(_, line)| begins_so(line)) {
+        Some((index, line)) => {
+            let line = super::super::facts::begin(line.trim());
+            format!(
+                "line {} is {line:?}, a record that is not read",
+                row + index
+            )
+        }
+        None => reason,
+    }
 }
 
 /// The lines of each airspace, with the number of the first.

@@ -75,6 +75,18 @@ fn open_airspaces_are_left_out_and_others_kept() {
 }
 
 #[test]
+fn a_record_that_is_not_read_is_named_as_it_is_written() {
+    let airway = circle("A", "airway", "GND", "FL100", MIDDLE).replacen("V X", "V W=1\r\nV X", 1);
+    let file = [airway, circle("R", "whole", "GND", "FL100", MIDDLE)].concat();
+    let read = zones(&file);
+    assert_eq!(read.scenario["threats"].as_array().map(Vec::len), Some(1));
+    assert_eq!(
+        unused(&read),
+        ["line 1: line 5 is \"V W=1\", a record that is not read"]
+    );
+}
+
+#[test]
 fn an_airspace_that_cannot_be_read_takes_nothing_from_the_next() {
     let broken = "AC R\nAN broken\nAL GND\nAH FL100\nDP 47:00:00 N 008:00:00 E\nDP nowhere\nDP 47:10:00 N 008:10:00 E\n";
     let file = [broken, &circle("R", "whole", "GND", "FL100", MIDDLE)].concat();

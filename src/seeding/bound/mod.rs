@@ -72,8 +72,10 @@ pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
     // Smaller rings forbid and cost less.
     let simpler = simpler(scenario, Side::Within);
     let scenario = simpler.as_ref().unwrap_or(scenario);
+    // The way may be too short to climb.
+    let needed = prices.rise() / toll::steepest(scenario);
     let straight = prices
-        .climbing_at(prices.fuel * prices.direct())
+        .climbing_at(prices.fuel * prices.direct().max(needed))
         .max(least_legs(scenario, &prices));
     let bound = round_walls(scenario, &prices, stop).max(straight);
     let bound = if bound.is_finite() { bound } else { straight };

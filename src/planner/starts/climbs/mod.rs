@@ -5,6 +5,7 @@
 //! places are found along which it gets there, from the cost of each leg and of how far the bends at its end are from
 //! that height. One search begins at the start and one at the target; they meet where both have climbed.
 
+mod helix;
 mod places;
 mod ways;
 
@@ -72,6 +73,9 @@ fn ways(model: &Model, share: f64) -> Found {
     let mut found = Found::default();
     let climb = Climb::by(model.scenario, share);
     if climb.least > (model.scenario.target - model.scenario.start).xy().norm() {
+        if share <= BETWEEN {
+            found.add(helix::routes(model, climb.least));
+        }
         for (near, room) in TRIES {
             let ways = Ways::new(model, climb, room);
             found.routes.extend(ways.routes(near));

@@ -19,6 +19,10 @@ const MEETINGS: usize = 400;
 /// Chains to one place by one leg are kept side by side if they differ by at least one of this many parts of the climb.
 const PARTS: usize = 10;
 
+/// Bends are no nearer to each other than this share of the direct way for each leg, where the vehicle may fly shorter
+/// legs: without any room between, they would be one turn.
+const SHORT: f64 = 0.1;
+
 /// What a bend must gain, as a share of the fuel for the climb.
 const WORTH: f64 = 1e-3;
 
@@ -64,7 +68,8 @@ impl<'m, 's> Ways<'m, 's> {
     pub(super) fn new(model: &'m Model<'s>, climb: Climb, room: f64) -> Self {
         let scenario = model.scenario;
         let max_turn = scenario.vehicle.max_turn() * (1.0 - SLACK);
-        let side = scenario.vehicle.min_leg * (1.0 + SLACK);
+        let short = SHORT * scenario.direct() / (scenario.planner.waypoints + 1) as f64;
+        let side = scenario.vehicle.min_leg.max(short) * (1.0 + SLACK);
         let places = places(scenario, climb, room * side / max_turn);
         let level = |&at: &Point2| scenario.terrain.elevation(at) + climb.height;
         let levels: Vec<f64> = places.iter().map(level).collect();

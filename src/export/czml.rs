@@ -112,10 +112,11 @@ fn volume(delivery: &Delivery, index: usize, threat: &Threat, shown: (f64, f64))
     let chart = delivery.chart();
     let middle = outline::middle(threat);
     let height = |z: f64| chart.ellipsoid_m(Point3::new(middle.x, middle.y, z));
-    let (lowest, highest) = outline::over_ground(&delivery.scenario.terrain, threat);
-    let base = threat.base.map_or(shown.0.min(height(lowest)), height);
-    let highest = shown.1.max(height(highest)).max(base + 10.0);
-    let top = threat.top.map_or(highest, height);
+    let over_ground = || outline::over_ground(&delivery.scenario.terrain, threat);
+    let lowest = || shown.0.min(height(over_ground().0));
+    let base = threat.base.map_or_else(lowest, height);
+    let highest = || shown.1.max(height(over_ground().1)).max(base + 10.0);
+    let top = threat.top.map_or_else(highest, height);
     let (base, top) = (rounded(base.min(top - 1.0), 1e3), rounded(top, 1e3));
     let look = json!({"solidColor": {"color": {"rgba": THREAT}}});
     let mut packet = json!({

@@ -27,8 +27,11 @@ const STYLES: [(&str, &str, &str, &str); 2] = [
 /// Write a plan. Without a path, the waypoints are drawn.
 pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
     let waypoints = (0..delivery.waypoints.len()).map(|index| waypoint(delivery, index));
+    let heights = delivery.course().iter();
+    let heights = heights.map(|&point| delivery.chart().msl_m(point));
+    let highest = heights.fold(f64::MIN, f64::max);
     let threats = delivery.scenario.threats.iter().enumerate();
-    let threats = threats.map(|(index, threat)| self::threat(delivery, index, threat));
+    let threats = threats.map(|(index, threat)| self::threat(delivery, index, threat, highest));
     let mut elements = vec![
         Kml::Element(text("name", delivery.title())),
         Kml::Element(text("description", &delivery.summary())),
@@ -92,20 +95,20 @@ fn waypoint(delivery: &Delivery, index: usize) -> Placemark {
 }
 
 /// A wall from the threat's top down to the ground, because KML has no floating volume. A threat without top ends at
-/// the highest point of the route, or where it stands out of its ground; where its base is higher, as a lid there: all
+/// the `highest` point of the route, or where it stands out of its ground; where its base is higher, as a lid there: all
 /// below it may be flown.
-fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Placemark {
+fn threat(delivery: &Delivery, index: usize, threat: &Threat, highest: f64) -> Placemark {
     let chart = delivery.chart();
-    let course = delivery.course().iter();
     let middle = outline::middle(threat);
     let height = |z: f64| chart.msl_m(Point3::new(middle.x, middle.y, z));
-    let (_, over_ground) = outline::over_ground(&delivery.scenario.terrain, threat);
-    let highest = course
-        .map(|&point| chart.msl_m(point))
-        .fold(height(over_ground), f64::max);
     let base = threat.base.map_or(f64::MIN, height);
-    let top = threat.top.map_or(highest.max(base), height);
-    let is_lid = threat.top.is_none() && base >= highest;
+    let (top, is_lid) = if let Some(top) = threat.top {
+        (height(top), false)
+    } else {
+        let (_, over_ground) = outline::over_ground(&delivery.scenario.terrain, threat);
+        let end = highest.max(height(over_ground));
+        (end.max(base), base >= end)
+    };
     let corner = |corner: Point2| {
         let LatLon { lat, lon } = chart.place(corner);
         Coord::new(lon, lat, Some(top))

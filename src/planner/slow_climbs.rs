@@ -55,7 +55,7 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
         let is_known = placed
             .iter()
             .any(|other| same(model.scenario, other, &route));
-        if is_known || is_hopeless(model, &route, log) {
+        if is_known || cannot_pay(model, &route, log) {
             continue;
         }
         placed.push(route.clone());
@@ -87,7 +87,7 @@ fn followed(ways: &[Vec<Point3>], waypoints: usize) -> Vec<Vec<Point3>> {
 
 /// Whether `route` will hardly become better than the best one: with fewer waypoints its way is hardly shorter or less
 /// exposed, only its heights may cost less.
-fn is_hopeless(model: &Model, route: &[Point3], log: &Log) -> bool {
+fn cannot_pay(model: &Model, route: &[Point3], log: &Log) -> bool {
     let figures = model.figures(route, model.scenario.planner.quadrature);
     log.best.is_feasible() && figures.fuel + figures.threat > log.best.cost * (1.0 + HOPE)
 }

@@ -60,7 +60,7 @@ impl Threat {
     pub(crate) fn effort(&self) -> usize {
         match &self.shape {
             Shape::Cylinder(_) => 1,
-            Shape::Polygon(polygon) => A_CORNER * polygon.vertices().len(),
+            Shape::Polygon(_) => A_CORNER * self.bends(),
         }
     }
 

@@ -7,7 +7,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::super::net::Found;
-use super::SLACK;
+use super::{SLACK, steepest};
 use crate::cost::Model;
 use crate::geometry::{Point2, Point3};
 use crate::optimizer::{Fitness, share_of};
@@ -33,15 +33,19 @@ const TRIED: usize = 16;
 /// Halvings of such an interval that may hold a turn: to the last digit.
 const HALVINGS: usize = 52;
 
-/// The best few for a climb that takes `least` metres along the ground, more than the direct way has.
-pub(super) fn routes(model: &Model, least: f64) -> Found {
+/// The best few from start to target; none where the direct way is long enough to climb.
+pub(super) fn routes(model: &Model) -> Found {
     let scenario = model.scenario;
     let mut found = Found::default();
+    let way = scenario.target - scenario.start;
+    let (away, least) = (way.xy().norm(), way.z.abs() / steepest(scenario));
+    if least <= away {
+        return found;
+    }
     let mut ways: Vec<(f64, Vec<Point3>)> = Vec::new();
     for times in LENGTHS {
         let length = least * times * (1.0 + SLACK);
         for legs in numbers(model, length) {
-            let away = (scenario.target - scenario.start).xy().norm();
             let turns = turns(legs, away / length, scenario.vehicle.max_turn());
             for turn in turns.into_iter().flat_map(|turn| [turn, -turn]) {
                 let route = winding(model, legs, length / legs as f64, turn);
@@ -142,7 +146,6 @@ fn winding(model: &Model, legs: usize, length: f64, turn: f64) -> Vec<Point3> {
 mod tests {
     use super::*;
     use crate::cost::turns as headings;
-    use crate::planner::starts::steepest;
     use crate::planner::tests::scenario;
     use crate::planner::{Nobody, plan};
     use crate::scenario::{Scenario, Seeding};
@@ -172,7 +175,7 @@ mod tests {
         let scenario = shaft(15.0);
         let model = Model::new(&scenario);
         let least = 28.5 / steepest(&scenario);
-        let found = routes(&model, least);
+        let found = routes(&model);
         assert!(!found.routes.is_empty());
         for route in &found.routes {
             let lengths = route.windows(2).map(|ends| (ends[1] - ends[0]).xy().norm());

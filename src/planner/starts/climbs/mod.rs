@@ -51,7 +51,8 @@ pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
     if is_over() {
         return Found::default();
     }
-    let mut found = ways(model, BETWEEN);
+    let mut found = helix::routes(model);
+    found.add(ways(model, BETWEEN));
     if model.scenario.weights.altitude > 0.0 {
         for share in SHARES {
             if is_over() {
@@ -73,9 +74,6 @@ fn ways(model: &Model, share: f64) -> Found {
     let mut found = Found::default();
     let climb = Climb::by(model.scenario, share);
     if climb.least > (model.scenario.target - model.scenario.start).xy().norm() {
-        if share <= BETWEEN {
-            found.add(helix::routes(model, climb.least));
-        }
         for (near, room) in TRIES {
             let ways = Ways::new(model, climb, room);
             found.routes.extend(ways.routes(near));

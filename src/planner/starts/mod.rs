@@ -21,6 +21,7 @@ mod roadmap;
 mod round;
 mod rounded;
 mod shapes;
+mod shortest;
 mod sides;
 mod spare;
 mod surplus;
@@ -83,6 +84,9 @@ pub(super) struct Starts {
     pub(super) evaluations: u64,
 }
 
+/// A route and its price.
+type Priced = (Fitness, Vec<Point3>);
+
 /// Whether a search of `scenario` starts from routes; else the algorithm runs alone.
 pub(super) fn are_wanted(scenario: &Scenario) -> bool {
     let settings = &scenario.planner;
@@ -110,6 +114,9 @@ fn starts_from(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let mut evaluations = shapes.routes_priced + shapes.legs_priced / (coarse as u64 + 1);
     let mut priced = with_as_many(model, shapes.routes, coarse, &is_over);
     evaluations += priced.len() as u64;
+    let shortest = shapes
+        .shortest
+        .and_then(|shape| with_as_many(model, vec![shape], coarse, &is_over).pop());
     // The known route goes first, so that others are refined only where they are already cheaper.
     priced[usize::from(is_known)..].sort_by(|one, other| one.0.rank(&other.0));
     let (mut beyond, mut grafts) = (Vec::new(), Vec::new());
@@ -119,6 +126,9 @@ fn starts_from(model: &Model, stop: &dyn Stop) -> Option<Starts> {
             let (grafted, effort) = grafts::grafted(model, &priced);
             evaluations += effort.routes + effort.legs / (coarse as u64 + 1);
             grafts = grafted;
+        }
+        if let Some((_, shortest)) = shortest.filter(|_| !is_known) {
+            evaluations += shortest::pull_forward(model, &shortest, &mut priced, stop);
         }
         refine(model, &mut priced, hopeless, stop, &mut evaluations);
         let best = priced.first().map_or(Fitness::WORST, |(best, _)| *best);
@@ -132,8 +142,7 @@ fn starts_from(model: &Model, stop: &dyn Stop) -> Option<Starts> {
         }
     }
     priced.truncate(STARTS);
-    let routes =
-        |priced: Vec<(Fitness, Vec<Point3>)>| priced.into_iter().map(|(_, route)| route).collect();
+    let routes = |priced: Vec<Priced>| priced.into_iter().map(|(_, route)| route).collect();
     Some(Starts {
         routes: routes(priced),
         grafts: routes(grafts),
@@ -149,8 +158,8 @@ fn with_as_many(
     shapes: Vec<Vec<Point3>>,
     waypoints: usize,
     is_over: &dyn Fn() -> bool,
-) -> Vec<(Fitness, Vec<Point3>)> {
-    let mut priced: Vec<(Fitness, Vec<Point3>)> = Vec::new();
+) -> Vec<Priced> {
+    let mut priced: Vec<Priced> = Vec::new();
     let is_scene_vast = is_vast(model.scenario);
     let is_late = || is_scene_vast && is_over();
     for shape in shapes {
@@ -160,7 +169,7 @@ fn with_as_many(
             break;
         }
         let route = with_waypoints_until(model, shape, waypoints, &is_late);
-        let is_same = |(_, other): &(Fitness, Vec<Point3>)| same(model.scenario, &route, other);
+        let is_same = |(_, other): &Priced| same(model.scenario, &route, other);
         if !priced.iter().any(is_same) {
             priced.push((price(model, &route), route));
         }
@@ -172,7 +181,7 @@ fn with_as_many(
 /// breaks limits will not be cheaper once it keeps them.
 fn refine(
     model: &Model,
-    priced: &mut Vec<(Fitness, Vec<Point3>)>,
+    priced: &mut Vec<Priced>,
     hopeless: f64,
     stop: &dyn Stop,
     evaluations: &mut u64,
@@ -189,7 +198,7 @@ fn refine(
     };
     let waypoints = priced.first().map_or(0, |(_, route)| route.len() - 2);
     let mut best = Fitness::WORST;
-    let mut refined: Vec<(Fitness, Vec<Point3>)> = Vec::new();
+    let mut refined: Vec<Priced> = Vec::new();
     let mut dear = Vec::new();
     for (fitness, mut route) in priced.drain(..) {
         if best.is_feasible() && fitness.cost > best.cost * (1.0 + hopeless) {

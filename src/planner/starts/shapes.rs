@@ -54,6 +54,8 @@ const ALIKE: f64 = 1.5;
 pub(super) struct Shapes {
     /// A known route first.
     pub(super) routes: Vec<Vec<Point3>>,
+    /// The shortest one round all threats over level ground, however dear their soft zones make it.
+    pub(super) shortest: Option<Vec<Point3>>,
     /// Round taut strings, as corners seen from above: as many as the route may have waypoints, and shorten it.
     pub(super) round: Vec<Vec<Point2>>,
     /// Whether one was known.
@@ -77,9 +79,10 @@ impl Shapes {
             ..Self::default()
         };
         if settings.seeding == Seeding::Tangent {
-            let (along, round) = along_strings(model, is_over);
-            shapes.routes.extend(along);
-            shapes.round = round;
+            let along = along_strings(model, is_over);
+            shapes.routes.extend(along.routes);
+            shapes.shortest = along.shortest;
+            shapes.round = along.round;
             // A caller who supplies a route has dealt with the hills already.
             if !shapes.is_known {
                 shapes.look_over_ground(model, is_over);
@@ -156,28 +159,39 @@ pub(super) fn bends(model: &Model, shapes: &[Vec<Point3>], hopeless: f64) -> usi
     bends.fold(least, usize::max).min(fewest.max(MOST_COARSE))
 }
 
-/// Routes with as few waypoints as each needs, along the taut strings of several scenes: round the
-/// soft zones, round the threats alone, over those that can be overflown, round steep ground. And as in
-/// [`Shapes::round`], the corners round those strings.
-pub(super) fn along_strings(
-    model: &Model,
-    is_over: &dyn Fn() -> bool,
-) -> (Vec<Vec<Point3>>, Vec<Vec<Point2>>) {
+/// What follows taut strings.
+#[derive(Default)]
+pub(super) struct Along {
+    /// Routes with as few waypoints as each needs.
+    pub(super) routes: Vec<Vec<Point3>>,
+    /// As in [`Shapes`].
+    shortest: Option<Vec<Point3>>,
+    /// As in [`Shapes`].
+    round: Vec<Vec<Point2>>,
+}
+
+/// Routes along the taut strings of several scenes: round the soft zones, round the threats alone, over those that can be
+/// overflown, round steep ground.
+pub(super) fn along_strings(model: &Model, is_over: &dyn Fn() -> bool) -> Along {
     let scenario = model.scenario;
     let everything = |_: usize, _: &Threat| true;
     let in_the_way = |_: usize, threat: &Threat| !over::passable(scenario, threat);
-    let (mut shapes, mut round) = (Vec::new(), Vec::new());
+    let mut along = Along::default();
     let waypoints = scenario.planner.waypoints;
+    let is_level = scenario.terrain.is_flat();
     let mut follow = |obstacles: &Obstacles, count: usize| {
+        let first = along.routes.len();
         for string in taut_strings_until(obstacles, count, is_over).strings {
-            shapes.push(along(model, &string, is_over));
-            if scenario.terrain.is_flat() {
-                round.push(tangents::corners(scenario, &string, waypoints));
+            along.routes.push(along_string(model, &string, is_over));
+            if is_level {
+                let corners = tangents::corners(scenario, &string, waypoints);
+                along.round.push(corners);
             }
         }
+        along.routes.get(first).cloned()
     };
     follow(&Obstacles::soft(scenario, everything), STRINGS);
-    follow(&Obstacles::hard(scenario, everything), STRINGS);
+    let shortest = follow(&Obstacles::hard(scenario, everything), STRINGS);
     if scenario
         .threats
         .iter()
@@ -194,8 +208,9 @@ pub(super) fn along_strings(
         follow(&obstacles, STRINGS_ROUND_MOUNTAINS);
     }
     // Straight ahead, for when crossing soft zones is worth it.
-    shapes.push(vec![scenario.start, scenario.target]);
-    (shapes, round)
+    along.routes.push(vec![scenario.start, scenario.target]);
+    along.shortest = shortest.filter(|_| is_level);
+    along
 }
 
 /// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is, as long
@@ -297,7 +312,7 @@ fn flown<'r>(
 }
 
 /// The route along `string`, in the middle of the band where it can be reached.
-fn along(model: &Model, string: &TautString, is_over: &dyn Fn() -> bool) -> Vec<Point3> {
+fn along_string(model: &Model, string: &TautString, is_over: &dyn Fn() -> bool) -> Vec<Point3> {
     let scenario = model.scenario;
     let corners = tangents::corners(scenario, string, scenario.planner.waypoints.min(COARSE));
     let mut route = vec![scenario.start];

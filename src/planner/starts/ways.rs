@@ -183,7 +183,7 @@ mod tests {
                     .0
                     .routes,
             );
-            let others = [others, best(&along_strings(&model, &|| false).0)];
+            let others = [others, best(&along_strings(&model, &|| false).routes)];
             assert!(ways.is_feasible());
             let is_far_better =
                 |other: &Fitness| !other.is_feasible() || ways.cost < 0.95 * other.cost;

@@ -6,7 +6,7 @@ use super::finish::{polish, refine};
 use super::log::Log;
 use super::newton::Newton;
 use super::polish::Steps;
-use super::price::{change, price};
+use super::price::{Priced, change, price};
 use super::search::COARSE_STEPS;
 use super::{StopReason, same, why_stop};
 use crate::cost::Model;
@@ -27,9 +27,6 @@ const STEPS: Steps = Steps {
     from: 0.05,
     ..COARSE_STEPS
 };
-
-/// A route and its price.
-type Priced = (Fitness, Vec<Point3>);
 
 /// Remove one waypoint after another, always the one without which the rest is best once pulled into place. Where that
 /// ends beyond the limits, go back a few waypoints and keep several routes from there on.

@@ -9,6 +9,9 @@ use crate::optimizer::Fitness;
 /// rounding.
 const PRICED_FROM: f64 = 0.5;
 
+/// A route and its price.
+pub(super) type Priced = (Fitness, Vec<Point3>);
+
 /// What the search tolerates.
 pub(super) fn search_tolerance(model: &Model) -> Tolerance {
     model.tolerance.scaled(PRICED_FROM)

@@ -1,8 +1,8 @@
 mod scenes;
 
 pub(super) use self::scenes::{
-    airspace, descent, disc, hilly_scenario, lobed, mountain, peaks, radar, route, scenario,
-    search_briefly, slalom, soft_wall, straight, wall,
+    airspace, descent, disc, hilly_scenario, lobed, mountain, outlined, peaks, radar, route,
+    scenario, search_briefly, slalom, soft_wall, straight, wall,
 };
 use super::newton::Newton;
 use super::*;

@@ -5,6 +5,7 @@ mod lattice;
 mod turns;
 mod ways;
 
+use super::price::Priced;
 use super::{Stop, same, why_stop};
 use crate::cost::{Model, metre};
 use crate::geometry::Point3;
@@ -73,7 +74,7 @@ impl<'m, 's> Polish<'m, 's> {
         &mut self,
         route: &mut Vec<Point3>,
         steps: Steps,
-        known: &[(Fitness, Vec<Point3>)],
+        known: &[Priced],
     ) -> Option<Fitness> {
         let scenario = self.model.scenario;
         let way = scenario.direct();
@@ -101,7 +102,7 @@ impl<'m, 's> Polish<'m, 's> {
                     };
                     best = next;
                     *route = trial;
-                    let is_known = |(fitness, other): &(Fitness, Vec<Point3>)| {
+                    let is_known = |(fitness, other): &Priced| {
                         !best.beats(fitness) && same(scenario, route, other)
                     };
                     if known.iter().any(is_known) {
@@ -121,7 +122,7 @@ impl<'m, 's> Polish<'m, 's> {
             }
             if failed >= 2 {
                 let hope = 1.0 + HOPE * step / (steps.from * way);
-                let is_out_of_reach = |(fitness, _): &(Fitness, Vec<Point3>)| {
+                let is_out_of_reach = |(fitness, _): &Priced| {
                     fitness.is_feasible() && best.cost > fitness.cost * hope
                 };
                 if known.iter().any(is_out_of_reach) {

@@ -8,7 +8,7 @@ use super::{is_vast, net, with_waypoints};
 use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
-use crate::planner::price::{price, pricer, search_tolerance};
+use crate::planner::price::{Priced, price, pricer, search_tolerance};
 
 /// Ways past the threats, other than the best one's, that get its ends.
 const MOST: usize = 16;
@@ -41,10 +41,7 @@ pub(super) fn are_wanted(model: &Model, is_rough: bool) -> bool {
 
 /// Of each way past the threats the first of the `starts`, which are `priced` best first, with the beginning, the end,
 /// or both, of the best of all; those that are better for it.
-pub(super) fn grafted(
-    model: &Model,
-    starts: &[(Fitness, Vec<Point3>)],
-) -> (Vec<(Fitness, Vec<Point3>)>, Effort) {
+pub(super) fn grafted(model: &Model, starts: &[Priced]) -> (Vec<Priced>, Effort) {
     let (mut grafts, mut effort) = (Vec::new(), Effort::default());
     let Some(((_, best), others)) = starts.split_first() else {
         return (grafts, effort);

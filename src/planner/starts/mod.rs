@@ -44,7 +44,7 @@ pub(super) use sides::different_first;
 pub(super) use vast::is_vast;
 
 use super::polish::{Polish, Steps};
-use super::price::price;
+use super::price::{Priced, price};
 use super::{Stop, same, why_stop};
 use crate::cost::Model;
 use crate::geometry::{LEVEL, Point2, Point3, Vector2};
@@ -84,9 +84,6 @@ pub(super) struct Starts {
     pub(super) evaluations: u64,
 }
 
-/// A route and its price.
-type Priced = (Fitness, Vec<Point3>);
-
 /// Whether a search of `scenario` starts from routes; else the algorithm runs alone.
 pub(super) fn are_wanted(scenario: &Scenario) -> bool {
     let settings = &scenario.planner;
@@ -114,9 +111,6 @@ fn starts_from(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let mut evaluations = shapes.routes_priced + shapes.legs_priced / (coarse as u64 + 1);
     let mut priced = with_as_many(model, shapes.routes, coarse, &is_over);
     evaluations += priced.len() as u64;
-    let shortest = shapes
-        .shortest
-        .and_then(|shape| with_as_many(model, vec![shape], coarse, &is_over).pop());
     // The known route goes first, so that others are refined only where they are already cheaper.
     priced[usize::from(is_known)..].sort_by(|one, other| one.0.rank(&other.0));
     let (mut beyond, mut grafts) = (Vec::new(), Vec::new());
@@ -127,8 +121,8 @@ fn starts_from(model: &Model, stop: &dyn Stop) -> Option<Starts> {
             evaluations += effort.routes + effort.legs / (coarse as u64 + 1);
             grafts = grafted;
         }
-        if let Some((_, shortest)) = shortest.filter(|_| !is_known) {
-            evaluations += shortest::pull_forward(model, &shortest, &mut priced, stop);
+        if let Some(shape) = shapes.shortest.filter(|_| !is_known) {
+            evaluations += shortest::pull_forward(model, shape, &mut priced, stop);
         }
         refine(model, &mut priced, hopeless, stop, &mut evaluations);
         let best = priced.first().map_or(Fitness::WORST, |(best, _)| *best);

@@ -102,8 +102,7 @@ mod tests {
     use super::*;
     use crate::cost::batch::LANES;
     use crate::geometry::Point2;
-    use crate::planner::tests::scenario;
-    use crate::threat::{Polygon, Shape, Threat};
+    use crate::planner::tests::{outlined, scenario};
 
     /// Around a coast of thousands of corners legs take long to price, so a stop is checked after few of them.
     #[test]
@@ -125,12 +124,7 @@ mod tests {
             let (sin, cos) = libm::sincos(std::f64::consts::TAU / 8e3 * f64::from(corner));
             Point2::new(850.0 + 50.0 * cos, 150.0 + 50.0 * sin)
         });
-        scenario.threats.push(Threat {
-            name: None,
-            shape: Shape::Polygon(Polygon::new(coast.collect(), 0.0)),
-            base: None,
-            top: None,
-        });
+        scenario.threats.push(outlined(coast.collect(), 0.0));
         assert!(is_vast(&scenario));
         let most = legs_unwatched(&scenario) as u64;
         let (few, is_empty) = priced(&scenario, 2);

@@ -180,18 +180,18 @@ pub(super) fn along_strings(model: &Model, is_over: &dyn Fn() -> bool) -> Along 
     let waypoints = scenario.planner.waypoints;
     let is_level = scenario.terrain.is_flat();
     let mut follow = |obstacles: &Obstacles, count: usize| {
-        let first = along.routes.len();
-        for string in taut_strings_until(obstacles, count, is_over).strings {
-            along.routes.push(along_string(model, &string, is_over));
+        let strings = taut_strings_until(obstacles, count, is_over).strings;
+        for string in &strings {
+            along.routes.push(along_string(model, string, is_over));
             if is_level {
-                let corners = tangents::corners(scenario, &string, waypoints);
+                let corners = tangents::corners(scenario, string, waypoints);
                 along.round.push(corners);
             }
         }
-        along.routes.get(first).cloned()
+        strings.len()
     };
-    follow(&Obstacles::soft(scenario, everything), STRINGS);
-    let shortest = follow(&Obstacles::hard(scenario, everything), STRINGS);
+    let softly = follow(&Obstacles::soft(scenario, everything), STRINGS);
+    let closely = follow(&Obstacles::hard(scenario, everything), STRINGS);
     if scenario
         .threats
         .iter()
@@ -209,7 +209,7 @@ pub(super) fn along_strings(model: &Model, is_over: &dyn Fn() -> bool) -> Along 
     }
     // Straight ahead, for when crossing soft zones is worth it.
     along.routes.push(vec![scenario.start, scenario.target]);
-    along.shortest = shortest.filter(|_| is_level);
+    along.shortest = (is_level && closely > 0).then(|| along.routes[softly].clone());
     along
 }
 
@@ -221,7 +221,7 @@ fn over_ground(
     strings: &[Vec<Point3>],
     is_over: &dyn Fn() -> bool,
 ) -> (Found, bool) {
-    let strings: Vec<Priced> = priced(model, strings).collect();
+    let strings: Vec<PricedShape> = priced(model, strings).collect();
     let cheapest = strings.iter().copied().min_by(by_rank);
     let dearest = cheapest.map_or(f64::INFINITY, |(fitness, _)| fitness.cost);
     let (mut found, few) = roadmap::routes(model, OVERLAND, dearest, is_over);
@@ -280,31 +280,34 @@ fn round_mountains(
     (found, routes_priced as u64)
 }
 
-/// A route and its price.
-type Priced<'r> = (Fitness, &'r [Point3]);
+/// A shape and its price.
+type PricedShape<'r> = (Fitness, &'r [Point3]);
 
-fn by_rank(one: &Priced, other: &Priced) -> std::cmp::Ordering {
+fn by_rank(one: &PricedShape, other: &PricedShape) -> std::cmp::Ordering {
     one.0.rank(&other.0)
 }
 
 pub(super) fn priced<'r>(
     model: &Model,
     routes: &'r [Vec<Point3>],
-) -> impl Iterator<Item = Priced<'r>> {
+) -> impl Iterator<Item = PricedShape<'r>> {
     let priced = |route: &'r Vec<Point3>| (price(model, route), route.as_slice());
     routes.iter().map(priced)
 }
 
 /// The best of those `priced` that can be flown as it is.
-fn best_of<'r>(model: &Model, priced: impl IntoIterator<Item = Priced<'r>>) -> Option<Priced<'r>> {
+fn best_of<'r>(
+    model: &Model,
+    priced: impl IntoIterator<Item = PricedShape<'r>>,
+) -> Option<PricedShape<'r>> {
     flown(model, priced).min_by(by_rank)
 }
 
 /// Those of the `priced` that can be flown as they are.
 fn flown<'r>(
     model: &Model,
-    priced: impl IntoIterator<Item = Priced<'r>>,
-) -> impl Iterator<Item = Priced<'r>> {
+    priced: impl IntoIterator<Item = PricedShape<'r>>,
+) -> impl Iterator<Item = PricedShape<'r>> {
     let most = model.scenario.planner.waypoints + 2;
     priced
         .into_iter()

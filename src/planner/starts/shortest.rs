@@ -4,26 +4,32 @@
 //! are gone once it is pulled into place, but until then sixteen detours of one kind may rank before it. Routes through a
 //! thin wall rank before it as well, and do not get out of that wall again.
 
-use super::{Priced, ROUGH_STEPS, STARTS};
+use super::{ROUGH_STEPS, STARTS, with_waypoints_until};
 use crate::cost::Model;
 use crate::geometry::Point3;
-use crate::planner::Stop;
 use crate::planner::polish::Polish;
+use crate::planner::price::Priced;
+use crate::planner::{Stop, why_stop};
 
-/// Where `shortest` is too far behind the best of the `ranked` starts to be refined, pull it into place and rank it anew;
-/// the number of routes priced for it.
+/// Where the start along the `shortest` shape is too far behind the best of the `ranked` ones to be refined, pull it into
+/// place and rank it anew; the number of routes priced for it.
 pub(super) fn pull_forward(
     model: &Model,
-    shortest: &[Point3],
+    shortest: Vec<Point3>,
     ranked: &mut Vec<Priced>,
     stop: &dyn Stop,
 ) -> u64 {
     let behind = ranked.get(STARTS..).unwrap_or_default();
-    let Some(idx) = behind.iter().position(|(_, route)| route == shortest) else {
+    let Some((_, any)) = behind.first() else {
+        return 0;
+    };
+    let waypoints = any.len() - 2;
+    let is_over = || why_stop(model.scenario, stop).is_some();
+    let shortest = with_waypoints_until(model, shortest, waypoints, &is_over);
+    let Some(idx) = behind.iter().position(|(_, route)| *route == shortest) else {
         return 0;
     };
     let (_, mut route) = ranked.remove(STARTS + idx);
-    let waypoints = route.len() - 2;
     let mut polish = Polish::new(model, stop);
     let fitness = polish.descend(&mut route, ROUGH_STEPS);
     let rank = ranked.partition_point(|(other, _)| other.rank(&fitness).is_le());
@@ -36,10 +42,9 @@ mod tests {
     use super::*;
     use crate::geometry::{Point2, Rect};
     use crate::planner::price::price;
-    use crate::planner::tests::{scenario, search_briefly, straight};
+    use crate::planner::tests::{outlined, scenario, search_briefly, straight};
     use crate::planner::{Nobody, plan};
     use crate::scenario::Scenario;
-    use crate::threat::{Polygon, Shape, Threat};
 
     /// Three thin walls with one gap each, the first of them full of soft zones, and room to fly round all of them.
     fn walls() -> Scenario {
@@ -60,13 +65,7 @@ mod tests {
                 (north_east, north),
                 (north_west, north),
             ];
-            let ring = corners.map(|(x, y)| Point2::new(x, y)).to_vec();
-            Threat {
-                name: None,
-                shape: Shape::Polygon(Polygon::new(ring, margin)),
-                base: None,
-                top: None,
-            }
+            outlined(corners.map(|(x, y)| Point2::new(x, y)).to_vec(), margin)
         };
         scenario.threats = vec![
             wall([250.0, 271.5, 260.0, 250.0], [-50.0, 591.3], 30.0),
@@ -109,9 +108,9 @@ mod tests {
         let ranked: Vec<Priced> = (1..=20).chain([0]).map(shifted).collect();
         let mut pulled = ranked.clone();
         let [ahead, behind] = [0, 20].map(|idx| ranked[idx].1.clone());
-        assert_eq!(pull_forward(&model, &ahead, &mut pulled, &Nobody), 0);
+        assert_eq!(pull_forward(&model, ahead, &mut pulled, &Nobody), 0);
         assert!(pulled == ranked);
-        assert!(pull_forward(&model, &behind, &mut pulled, &Nobody) > 0);
+        assert!(pull_forward(&model, behind.clone(), &mut pulled, &Nobody) > 0);
         assert_eq!(pulled.len(), ranked.len());
         assert!(!pulled.iter().any(|(_, route)| *route == behind));
         let is_new = |(_, route): &&Priced| !ranked.iter().any(|(_, other)| other == route);

@@ -8,8 +8,7 @@ use super::shapes::{HOPELESS_OVER_HILLS, OVERLAND, bends, priced};
 use super::{known, refine, roadmap, with_waypoints};
 use crate::cost::Model;
 use crate::geometry::Point3;
-use crate::optimizer::Fitness;
-use crate::planner::price::price;
+use crate::planner::price::{Priced, price};
 use crate::planner::{Stop, why_stop};
 
 /// How much wider the band is on either side, as a share of its height.
@@ -27,11 +26,7 @@ const MOST: usize = 2;
 
 /// Routes with the requested number of waypoints that break limits of the band, but would cost less in a wider one than
 /// all that were `found` in it; and how many routes were priced to find them.
-pub(super) fn routes(
-    model: &Model,
-    found: &[(Fitness, Vec<Point3>)],
-    stop: &dyn Stop,
-) -> (Vec<Vec<Point3>>, u64) {
+pub(super) fn routes(model: &Model, found: &[Priced], stop: &dyn Stop) -> (Vec<Vec<Point3>>, u64) {
     let flown = found.iter().filter(|(fitness, _)| fitness.is_feasible());
     let costs = flown.map(|(fitness, _)| fitness.cost);
     let best = costs.fold(f64::INFINITY, f64::min);
@@ -81,6 +76,7 @@ pub(super) fn routes(
 mod tests {
     use super::*;
     use crate::geometry::Point2;
+    use crate::optimizer::Fitness;
     use crate::planner::tests::{disc, peaks, scenario};
     use crate::planner::{Nobody, plan};
     use crate::scenario::{AltitudeBand, Scenario, Seeding};

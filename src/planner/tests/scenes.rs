@@ -105,10 +105,14 @@ pub(in crate::planner) fn soft_wall(
     margin: f64,
 ) -> Threat {
     let corners = [(west, south), (east, south), (east, north), (west, north)];
-    let ring = corners.map(|(x, y)| Point2::new(x, y)).to_vec();
+    outlined(corners.map(|(x, y)| Point2::new(x, y)).to_vec(), margin)
+}
+
+/// A threat with these corners and a soft zone of `margin`, at all heights.
+pub(in crate::planner) fn outlined(corners: Vec<Point2>, margin: f64) -> Threat {
     Threat {
         name: None,
-        shape: Shape::Polygon(Polygon::new(ring, margin)),
+        shape: Shape::Polygon(Polygon::new(corners, margin)),
         base: None,
         top: None,
     }
@@ -122,13 +126,7 @@ pub(in crate::planner) fn lobed([x, y, radius]: [f64; 3], corners: usize) -> Thr
         let away = radius * (1.0 + 0.2 * libm::sin(5.0 * step * idx as f64));
         Point2::new(x + away * cos, y + away * sin)
     };
-    let ring = (0..corners).map(corner).collect();
-    Threat {
-        name: None,
-        shape: Shape::Polygon(Polygon::new(ring, 30.0)),
-        base: None,
-        top: None,
-    }
+    outlined((0..corners).map(corner).collect(), 30.0)
 }
 
 /// Let `scenario` be planned with all that helps, and few bats.

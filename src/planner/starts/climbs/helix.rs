@@ -10,8 +10,8 @@ use super::super::net::Found;
 use super::{SLACK, steepest};
 use crate::cost::Model;
 use crate::geometry::{Point2, Point3};
-use crate::optimizer::{Fitness, share_of};
-use crate::planner::price::price;
+use crate::optimizer::share_of;
+use crate::planner::price::{Priced, price};
 use crate::planner::same;
 use crate::planner::starts::direction;
 
@@ -57,7 +57,7 @@ pub(super) fn routes(model: &Model) -> Found {
     // Of those inside, the shorter ones come first.
     ways.sort_by(|(one, _), (other, _)| one.total_cmp(other));
     ways.truncate(PRICED);
-    let mut priced: Vec<(Fitness, Vec<Point3>)> = Vec::new();
+    let mut priced: Vec<Priced> = Vec::new();
     for (_, route) in ways {
         found.legs_priced += route.len() as u64 - 1;
         priced.push((price(model, &route), route));
